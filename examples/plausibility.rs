@@ -203,7 +203,11 @@ fn row(folder: &Path) -> String {
     let raw = read(folder);
     let (right, facts) = told(raw.clone());
     let facts = facts.expect("a sound model");
-    let (length, mass, time) = (raw.units.length.to_si(), raw.units.mass.to_si(), raw.units.time.to_si());
+    let (length, mass, time) = (
+        raw.data.description.units.length.to_si(),
+        raw.data.description.units.mass.to_si(),
+        raw.data.description.units.time.to_si(),
+    );
     let speed = facts.sound_speed.map_or("-".to_owned(), |s| {
         format!("{:.0} / {:.0}", s.whole * length / time, s.median * length / time)
     });

@@ -29,7 +29,7 @@ pub struct GeometricStiffness {
 impl FlexBody {
     /// Returns the name of the model.
     pub fn name(&self) -> &str {
-        &self.0.source().name
+        &self.0.description().name
     }
 
     /// Returns the units of length, mass and time as they were stated: `"mm"`, `"t"`, `"s"`, or factors to SI.

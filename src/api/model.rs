@@ -227,7 +227,7 @@ impl ModelBuilder {
     /// FB125 for an invalid index, a triangle or an edge with a repeated node, or neither triangles nor edges.
     pub fn mesh(mut self, triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Result<Self> {
         let mesh = SurfaceMesh::new(triangles, edges, self.raw.nodes.len());
-        self.raw.mesh = Some(mesh.map_err(|problem| Diagnostic::new(Code::MeshForeign, problem))?);
+        self.raw.data.mesh = Some(mesh.map_err(|problem| Diagnostic::new(Code::MeshForeign, problem))?);
         Ok(self)
     }
 
@@ -245,7 +245,7 @@ impl ModelBuilder {
     /// FB202 for an unknown unit.
     pub fn units(mut self, length: &str, mass: &str, time: &str) -> Result<Self> {
         let parsed = UnitSystem::parse(length, mass, time);
-        self.raw.units =
+        self.raw.data.description.units =
             parsed.map_err(|message| Error::from(Diagnostic::new(Code::ManifestUnit, message)))?;
         Ok(self)
     }
@@ -253,14 +253,14 @@ impl ModelBuilder {
     /// Adds a set of nodes that joints and loads act on. It is coupled to its reference point by the mean motion of the
     /// nodes; the point is the mean of the nodes.
     pub fn interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
-        self.raw.interfaces.push(NodeSet::new(name, nodes));
+        self.raw.data.interfaces.push(NodeSet::new(name, nodes));
         self
     }
 
     /// Adds an interface whose nodes move as a rigid body. The reference point is the mean of the nodes.
     pub fn rigid_interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
         let coupling = Some(Coupling::Rigid);
-        self.raw.interfaces.push(NodeSet { coupling, ..NodeSet::new(name, nodes) });
+        self.raw.data.interfaces.push(NodeSet { coupling, ..NodeSet::new(name, nodes) });
         self
     }
 
@@ -274,7 +274,7 @@ impl ModelBuilder {
     ) -> Self {
         let coupling = Some(coupling);
         let reference = reference.map_or(Reference::Centre, Reference::Point);
-        self.raw.interfaces.push(NodeSet { coupling, reference, ..NodeSet::new(name, nodes) });
+        self.raw.data.interfaces.push(NodeSet { coupling, reference, ..NodeSet::new(name, nodes) });
         self
     }
 
@@ -314,7 +314,7 @@ impl ModelBuilder {
 
     /// Sets one damping ratio for all modes.
     pub fn damping_ratio(mut self, ratio: f64) -> Self {
-        self.raw.damping = Some(Damping::Ratio(ratio));
+        self.raw.data.damping = Some(Damping::Ratio(ratio));
         self
     }
 
@@ -323,20 +323,20 @@ impl ModelBuilder {
     /// refused by [`ModelBuilder::build`].
     pub fn damping_bands(mut self, bands: &[(f64, f64)]) -> Self {
         let band = |&(to_hz, ratio): &(f64, f64)| DampingBand { to_hz, ratio };
-        self.raw.damping = Some(Damping::Bands(bands.iter().map(band).collect()));
+        self.raw.data.damping = Some(Damping::Bands(bands.iter().map(band).collect()));
         self
     }
 
     /// Sets Rayleigh damping D = alpha M + beta K. Units: 1/time, time.
     pub fn rayleigh_damping(mut self, alpha: f64, beta: f64) -> Self {
-        self.raw.damping = Some(Damping::Rayleigh { alpha, beta });
+        self.raw.data.damping = Some(Damping::Rayleigh { alpha, beta });
         self
     }
 
     /// Sets a damping matrix with the rows of K. Unit: mass/time.
     pub fn damping_matrix(mut self, damping: SparseMatrix) -> Self {
         let matrix = RawMatrix { matrix: damping.0, digits: 17, path: PathBuf::new() };
-        self.raw.damping = Some(Damping::Matrix(matrix));
+        self.raw.data.damping = Some(Damping::Matrix(matrix));
         self
     }
 
@@ -364,7 +364,7 @@ impl ModelBuilder {
             let mut interface = InterfaceSource::named(&name, &region, coupling, self.raw.dimension)?;
             interface.reference = reference.unwrap_or(interface.reference);
             let set = interface_in_memory(&interface, &self.raw)?;
-            self.raw.interfaces.push(set);
+            self.raw.data.interfaces.push(set);
         }
         Model::checked(self.raw, self.residual_vectors)
     }

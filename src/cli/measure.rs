@@ -30,6 +30,6 @@ pub(super) fn run(arguments: &MeasureArguments) -> Result<Outcome> {
     run.note(found);
     let data = run.data()?;
     let history = history.display().to_string();
-    let facts = MeasuredRunFacts::new(&measured, &body.source().name, history, &data);
+    let facts = MeasuredRunFacts::new(&measured, &body.description().name, history, &data);
     run.end(None, |format| facts.render(format), measured.holds())
 }

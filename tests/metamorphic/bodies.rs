@@ -51,7 +51,11 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
     let offset = (kind == 2 && one_in(own, 2)).then(|| direction(own, 3) * 0.2);
     let raw = with_ends(raw, kind == 2, offset);
     let (recoveries, named_loads) = (recoveries::of(&raw), named_loads::of(&raw));
-    RawModel { damping: damping(random), recoveries, named_loads, ..raw }
+    raw.with(|data| {
+        data.damping = damping(random);
+        data.recoveries = recoveries;
+        data.named_loads = named_loads;
+    })
 }
 
 /// Returns damping of the model in a third of the draws.
@@ -85,7 +89,7 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
         true => of_spin(&raw, &parts),
         false => Vec::new(),
     };
-    RawModel { geometric_stiffness, ..raw }
+    raw.with(|data| data.geometric_stiffness = geometric_stiffness)
 }
 
 /// Returns the model with interfaces `root` and `tip` of its nodes with smallest and largest x; if `by_node`
@@ -117,7 +121,7 @@ fn with_ends(raw: RawModel, by_node: bool, offset: Option<Vector3<f64>>) -> RawM
         false => set("root", &order[..AT_ROOT]),
     };
     let interfaces = vec![root, set("tip", &order[order.len() - AT_TIP..])];
-    RawModel { interfaces, ..raw }
+    raw.with(|data| data.interfaces = interfaces)
 }
 
 /// Returns true if a node has rotations.

@@ -42,7 +42,7 @@ pub fn scaled(raw: &RawModel, force: f64, length: f64) -> Vec<ModelLoad> {
 
 /// Returns the loads with every force as the forces that `entry` makes of it.
 fn changed(raw: &RawModel, entry: impl Fn(usize, f64) -> Vec<(usize, f64)>) -> Vec<ModelLoad> {
-    let mut all = raw.named_loads.clone();
+    let mut all = raw.data.named_loads.clone();
     for load in &mut all {
         let mut forces = vec![0.0; load.forces.len()];
         for (row, &value) in load.forces.iter().enumerate() {

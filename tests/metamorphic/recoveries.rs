@@ -134,7 +134,7 @@ fn changed(
     entry: impl Fn((u32, f64)) -> Vec<(u32, f64)>,
     place: impl Fn([f64; 3]) -> [f64; 3],
 ) -> Vec<ModelRecovery> {
-    let mut all = raw.recoveries.clone();
+    let mut all = raw.data.recoveries.clone();
     for one in &mut all {
         match &mut one.operator {
             RecoveryOperator::Rows { transposed, .. } => {

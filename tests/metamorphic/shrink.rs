@@ -24,14 +24,14 @@ fn simplifications(subject: &Subject) -> Vec<Subject> {
         change(&mut simpler);
         all.push(simpler);
     };
-    if subject.raw.damping.is_some() {
-        model(&|simpler| simpler.raw.damping = None);
+    if subject.raw.data.damping.is_some() {
+        model(&|simpler| simpler.raw.data.damping = None);
     }
     if subject.second.is_some() {
         model(&|simpler| simpler.second = None);
     }
-    if !subject.raw.geometric_stiffness.is_empty() {
-        model(&|simpler| simpler.raw.geometric_stiffness.clear());
+    if !subject.raw.data.geometric_stiffness.is_empty() {
+        model(&|simpler| simpler.raw.data.geometric_stiffness.clear());
     }
     if let Basis::Lowest(count @ 2..) = subject.basis {
         model(&|simpler| simpler.basis = Basis::Lowest(count / 2));

@@ -26,7 +26,7 @@ pub enum Basis {
 /// the latter does not hold in mean axes (FB214).
 pub fn frames(raw: &RawModel) -> Vec<FrameChoice> {
     let at = |name: &&str| FrameChoice::Interface((*name).to_owned());
-    let interfaces = if raw.geometric_stiffness.is_empty() { &["root", "tip"][..] } else { &[] };
+    let interfaces = if raw.data.geometric_stiffness.is_empty() { &["root", "tip"][..] } else { &[] };
     BodyFrame::ALL.iter().map(|&frame| FrameChoice::Mean(frame)).chain(interfaces.iter().map(at)).collect()
 }
 

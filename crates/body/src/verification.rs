@@ -79,7 +79,7 @@ impl Checks {
 /// # Errors
 /// The errors of [`FeModel::from_raw`]; [`BodyIncomparable`](Code::BodyIncomparable) if the model holds other bodies.
 pub fn model_of(body: &FlexBody, raw: RawModel) -> Result<CheckedModel> {
-    let Some(number) = body.source().number else { return FeModel::from_raw(raw) };
+    let Some(number) = body.description().number else { return FeModel::from_raw(raw) };
     let bodies = FeModel::bodies_from_raw(raw)?;
     let count = bodies.len();
     let found = bodies.into_iter().find(|checked| checked.model.number() == Some(number));
@@ -140,7 +140,7 @@ fn of_other_model(body: &FlexBody, message: String) -> Error {
     };
     let help = format!(
         "give the model that the body `{}` was made of{made_of}, or convert this model again",
-        body.source().name
+        body.description().name
     );
     Diagnostic::new(Code::BodyIncomparable, message).with_help(help).into()
 }

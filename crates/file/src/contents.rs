@@ -62,7 +62,7 @@ pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
                     arrays.push(NamedArray {
                         path: format!("{path}/{}", item.name),
                         symbol: item.symbol,
-                        units: item.units.concrete(&view.body.units),
+                        units: item.units.concrete(&view.body.description.units),
                         description: item.description,
                         shape: item.dims(&view),
                         values,

@@ -13,7 +13,7 @@ use flexbody_body::flex_body::{
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
 };
-use flexbody_model::{BodyNumber, Nodes};
+use flexbody_model::{BodyNumber, Description, Nodes};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
@@ -119,7 +119,7 @@ impl Draft {
     }
 
     pub(super) fn number(&mut self) -> &mut BodyNumber {
-        self.body.source.number.get_or_insert(BodyNumber { number: 0, of: 0 })
+        self.body.description.number.get_or_insert(BodyNumber { number: 0, of: 0 })
     }
 
     pub(super) fn internal(&mut self) -> &mut InternalRows {
@@ -378,17 +378,15 @@ impl InvariantEntries {
 
 fn empty_body(units: UnitSystem, storage: Storage, invariants: Invariants) -> Parts {
     Parts {
+        description: Description::new("", units),
         source: Source {
-            name: String::new(),
             files: Vec::new(),
-            number: None,
             n_dofs: 0,
             mass_structure: MassStructure::General,
             approximation: None,
             settings: serde_json::Value::Null,
         },
         dimension: 3,
-        units,
         frame: Frame { origin: Vector3::zeros(), axes: Matrix3::identity() },
         conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes::default(),

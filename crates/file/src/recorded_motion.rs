@@ -56,11 +56,11 @@ impl RecordedMotion {
     /// FB735 for the motion of another body; the errors of [`FlexBody::carried`].
     pub fn body_in_frame(&self, body: &FlexBody) -> Result<FlexBody> {
         let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
-        if self.body != body.source().name {
+        if self.body != body.description().name {
             return foreign(format!(
                 "the motion belongs to the body `{}`, not to `{}`",
                 self.body,
-                body.source().name
+                body.description().name
             ));
         }
         let body_in_frame = match &self.carrier {

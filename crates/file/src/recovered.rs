@@ -57,7 +57,7 @@ fn begun(
     put_text(&file, "format", format)?;
     file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
     put_text(&file, "generator", &generator())?;
-    put_text(&file, "body", &body.source().name)?;
+    put_text(&file, "body", &body.description().name)?;
     put_text(&file, origin.0, origin.1)?;
     let time = put_numbers(&file.as_group()?, "time", &[times.len()], times, &mut numbers)?;
     put_text(&time, "units", body.units().time.name())?;

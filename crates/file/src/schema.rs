@@ -73,21 +73,21 @@ const ROOT: &[Item] = &[
         Text,
         ONE,
         "unit of length: a name (`m mm cm um km in ft`) or its size in m",
-        written(|v| text(v.body.units.length.name())),
+        written(|v| text(v.body.description.units.length.name())),
     ),
     attribute(
         "units_mass",
         Text,
         ONE,
         "unit of mass: a name (`kg g t tonne lb slug slinch`) or its size in kg",
-        written(|v| text(v.body.units.mass.name())),
+        written(|v| text(v.body.description.units.mass.name())),
     ),
     attribute(
         "units_time",
         Text,
         ONE,
         "unit of time: a name (`s ms us`) or its size in s",
-        written(|v| text(v.body.units.time.name())),
+        written(|v| text(v.body.description.units.time.name())),
     ),
     attribute(
         "storage",
@@ -102,7 +102,7 @@ const ROOT: &[Item] = &[
         Int,
         ONE,
         "1: the user stated the units; 0: m, kg, s were assumed",
-        written(|v| Some(Value::Int(v.body.units.stated.into()))),
+        written(|v| Some(Value::Int(v.body.description.units.stated.into()))),
     ),
     attribute(
         LIST,
@@ -131,7 +131,7 @@ fn both_or_none(entries: &[(String, bool)]) -> String {
 static BODY_NUMBER: EntrySet = EntrySet { problem: both_or_none };
 static INTERNAL_ROWS: EntrySet = EntrySet { problem: both_or_none };
 const SOURCE: &[Item] = &[
-    attribute("model", Text, ONE, "name of the model", field!(source.name)),
+    attribute("model", Text, ONE, "name of the model", field!(description.name)),
     attribute(
         "files",
         Text,
@@ -363,7 +363,7 @@ const MODES: &[Item] = &[
         "f",
         "sqrt(lambda) / (2 pi), in hertz whatever the unit of time",
         written(|v| {
-            let hertz = v.body.units.hertz();
+            let hertz = v.body.description.units.hertz();
             let frequency = |l: &f64| l.sqrt() / std::f64::consts::TAU * hertz;
             Some(Value::Floats(v.body.modes.eigenvalue.iter().map(frequency).collect()))
         }),

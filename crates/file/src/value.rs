@@ -49,7 +49,7 @@ impl<'a> View<'a> {
     }
 
     pub(crate) fn number(&self) -> Option<BodyNumber> {
-        self.body.source.number
+        self.body.description.number
     }
 
     pub(crate) fn internal(&self) -> Option<&'a InternalRows> {

@@ -145,7 +145,7 @@ fn nearest_f32(value: f64) -> f32 {
 }
 
 fn describe(dataset: &hdf5::Dataset, item: &Item, view: &View<'_>) -> hdf5::Result<()> {
-    put_text(dataset, "units", &item.units.concrete(&view.body.units))?;
+    put_text(dataset, "units", &item.units.concrete(&view.body.description.units))?;
     put_text(dataset, "symbol", item.symbol)?;
     put_text(dataset, "description", item.description)
 }

@@ -58,7 +58,7 @@ impl NodalShapes {
             (0..count).map(of_shape).collect()
         });
         Self {
-            body: body.source().name.clone(),
+            body: body.description().name.clone(),
             modes_follow_spin: body.groups().w1,
             nodes: model.nodes().ids.clone(),
             positions: model.nodes().positions.clone(),

@@ -13,7 +13,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, read_toml, real};
 use flexbody_base::units::UnitSystem;
-use flexbody_model::{Damping, GeometricStiffness, LoadKind, UnitLoad, damping_bands};
+use flexbody_model::{Damping, Description, GeometricStiffness, LoadKind, UnitLoad, damping_bands};
 use std::ops::{Deref, DerefMut, Range};
 use std::path::Path;
 use toml::de::DeValue;
@@ -108,9 +108,8 @@ impl ManifestWalk<'_, '_> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let mesh = self.string(files, "mesh").map(|mesh| folder.join(mesh));
         Some(ModelFiles {
-            name: name.unwrap_or_else(|| stem(self.path)),
+            description: Description::new(name.unwrap_or_else(|| stem(self.path)), units),
             dimension,
-            units,
             allow_implausible,
             keep_soft_rotations,
             source: source?,

@@ -6,7 +6,7 @@ use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::ties::{first_smallest, sort_ascending};
-use flexbody_model::{Coupling, Damping, GeometricStiffness, Reference};
+use flexbody_model::{Coupling, Damping, Description, GeometricStiffness, Reference};
 use nalgebra::Vector3;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -14,12 +14,10 @@ use std::path::{Path, PathBuf};
 /// Files of a model with their settings, from a manifest or from the command line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFiles {
-    /// Name of the model.
-    pub name: String,
+    /// Name of the model and units of the numbers in the files.
+    pub description: Description,
     /// Number of dimensions: 3 or 2.
     pub dimension: u8,
-    /// Units of the numbers in the files.
-    pub units: UnitSystem,
     /// True if implausible properties that a person has checked are warnings: see
     /// [`RawModel`](flexbody_model::RawModel).
     pub allow_implausible: bool,
@@ -363,9 +361,11 @@ impl ModelFiles {
 
     fn of(name: String, source: ModelSource, units: Option<&str>) -> Result<Self> {
         Ok(Self {
-            name,
+            description: Description::new(
+                name,
+                units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
+            ),
             dimension: 3,
-            units: units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
             allow_implausible: false,
             keep_soft_rotations: false,
             source,
@@ -590,8 +590,8 @@ mod tests {
     fn units_on_the_command_line() {
         let files = |units| ModelFiles::from_arguments("d/K.mtx.gz", "M.mtx", "n.csv", None, units);
         let model = files(Some("mm, t,s")).unwrap();
-        assert_eq!((model.name.as_str(), model.units.mass.to_si()), ("K", 1000.0));
-        assert!(!files(None).unwrap().units.stated);
+        assert_eq!((model.description.name.as_str(), model.description.units.mass.to_si()), ("K", 1000.0));
+        assert!(!files(None).unwrap().description.units.stated);
         for bad in ["mm,t", "mm,t,s,K", "mm,stone,s", "mm,-1,s", ""] {
             assert!(files(Some(bad)).unwrap_err().has(Code::ManifestUnit), "{bad}");
         }

@@ -21,7 +21,9 @@ use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::Sources;
 use flexbody_base::text::quotes::without_foreign_quotes;
-use flexbody_model::{GeometricStiffness, GivenRows, ModelLoad, NodeSet, RawMatrix, RawModel, UnitLoad};
+use flexbody_model::{
+    GeometricStiffness, GivenRows, ModelData, ModelLoad, NodeSet, RawMatrix, RawModel, UnitLoad,
+};
 use interfaces::NodeLookup;
 use labels_of_file::LabelsOfFile;
 use model_matrices::{JobFileRead, ModelMatrices};
@@ -53,7 +55,8 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     of_job.iter().try_for_each(|(_, file)| file.refuse_changed())?;
     opened.forget_bytes();
     let given = files.clone();
-    Ok(RawModel { sources: Sources::later(move || sources(&given, &of_job, &opened)), ..model })
+    let sources = Sources::later(move || sources(&given, &of_job, &opened));
+    Ok(model.with(|data| data.sources = sources))
 }
 
 /// Returns errors for files that name other rows than those of the model.
@@ -124,27 +127,29 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     diagnostics.extend(difference_note(&differences));
     let (mesh, partly) = mesh.unwrap_or_default();
     diagnostics.extend(partly);
-    let model = RawModel {
-        name: files.name.clone(),
-        dimension: files.dimension,
-        units: files.units.clone(),
-        stiffness: matrices.stiffness,
-        mass: matrices.mass,
-        nodes: matrices.nodes,
-        nodes_path: matrices.nodes_path,
-        mesh,
-        dofs: matrices.dofs,
-        dofs_path: matrices.dofs_path,
-        given_rows: matrices.given_rows,
-        followers: matrices.followers,
+    let data = ModelData {
+        description: files.description.clone(),
         interfaces,
+        mesh,
         damping,
         geometric_stiffness,
         recoveries,
         named_loads,
+        sources: Sources::default(),
+    };
+    let model = RawModel {
+        data,
+        dimension: files.dimension,
+        stiffness: matrices.stiffness,
+        mass: matrices.mass,
+        nodes: matrices.nodes,
+        nodes_path: matrices.nodes_path,
+        dofs: matrices.dofs,
+        dofs_path: matrices.dofs_path,
+        given_rows: matrices.given_rows,
+        followers: matrices.followers,
         allow_implausible: files.allow_implausible,
         keep_soft_rotations: files.keep_soft_rotations,
-        sources: Sources::default(),
         diagnostics,
     };
     Ok((model, matrices.files))

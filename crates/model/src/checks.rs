@@ -11,7 +11,6 @@ pub(crate) mod stress_loads;
 pub(crate) mod stress_notes;
 pub(crate) mod uniform_strains;
 
-use crate::body_number::BodyNumber;
 use crate::checks::density::{Densities, LocalMass, SoundSpeed, check_density, check_exchanged, check_speed};
 use crate::checks::node_pairs::check_mass_pairs;
 use crate::checks::rigid_motion::{check_inertia, check_massless, check_rigid_motion, misplaced, recover};
@@ -76,15 +75,11 @@ impl FeModel {
 /// motion.
 pub fn check(raw: RawModel) -> Result<CheckedModel> {
     let (assembled, found) = assemble(raw)?;
-    check_body(assembled, None, found)
+    check_body(assembled, found)
 }
 
 /// Checks a body: its mass, its connections, its rigid motion.
-pub(crate) fn check_body(
-    mut body: Assembled,
-    number: Option<BodyNumber>,
-    mut found: Vec<Diagnostic>,
-) -> Result<CheckedModel> {
+pub(crate) fn check_body(mut body: Assembled, mut found: Vec<Diagnostic>) -> Result<CheckedModel> {
     found.extend(check_exchanged_matrices(&body));
     stop_on_error(&mut found)?;
     let given = body.followers.take();
@@ -100,7 +95,7 @@ pub(crate) fn check_body(
     // Vectors that rigid motion moves have no position x in the formulas for Ms.
     form.commutes &= body.rows.are_still();
     if !form.commutes {
-        check_inertia(&body, rounding(body.raw.mass.digits, 3).max(1e-9), &mut found);
+        check_inertia(&body, rounding(body.origin.mass.digits, 3).max(1e-9), &mut found);
         stop_on_error(&mut found)?;
     }
     let diagonal_mass = is_diagonal(&body.mass);
@@ -111,12 +106,12 @@ pub(crate) fn check_body(
         ..check_local_mass(&body, &form, diagonal_mass, &mut found)
     };
     stop_on_error(&mut found)?;
-    let mass_rounding = block_tolerance(body.raw.mass.digits);
-    let mass_path = body.raw.mass.path.clone();
-    let stress_files = std::mem::take(&mut body.raw.geometric_stiffness);
+    let mass_rounding = block_tolerance(body.origin.mass.digits);
+    let mass_path = body.origin.mass.path.clone();
+    let stress_files = std::mem::take(&mut body.origin.geometric_stiffness);
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
-    let allowed = body.raw.allow_implausible;
-    let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number).with_followers(followers);
+    let allowed = body.origin.allow_implausible;
+    let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass).with_followers(followers);
     model.find_fixed_mass(mass_rounding);
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
     let follows = found.iter().any(|note| note.code() == Code::DeckConstrained)
@@ -134,8 +129,8 @@ pub(crate) fn check_body(
 
 /// Returns the form of the mass matrix; `None` with a diagnostic if it belongs to no physical body.
 fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassForm> {
-    let form = mass_form(&body.mass, &body.rows, block_tolerance(body.raw.mass.digits));
-    form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
+    let form = mass_form(&body.mass, &body.rows, block_tolerance(body.origin.mass.digits));
+    form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.origin.mass.path))).ok()
 }
 
 /// Finds the rigid motion of every row, and checks that K and the other matrices leave it free. Returns the
@@ -145,27 +140,27 @@ fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassFor
 /// Rows without a position whose motion K does not determine, with all earlier findings.
 fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Result<f64> {
     if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
-        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        found.push(diagnostic.in_file(&body.origin.stiffness.path));
         stop_on_error(found)?;
     }
     let label = |row: usize| body.rows.label(&body.nodes, row);
     if let Some(diagnostic) = misplaced(&body.rows) {
-        found.push(diagnostic.in_file(&body.raw.nodes_path));
+        found.push(diagnostic.in_file(&body.origin.nodes_path));
     } else if let Some(diagnostic) = refuse_turned_internals(&body.mass, &body.rows, &body.nodes) {
-        found.push(diagnostic.in_file(&body.raw.mass.path));
+        found.push(diagnostic.in_file(&body.origin.mass.path));
     }
     if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
-        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        found.push(diagnostic.in_file(&body.origin.stiffness.path));
     }
-    let written = body.raw.stiffness.digits;
+    let written = body.origin.stiffness.digits;
     let rounded = rounding(written, 1).max(1e-9);
     let limit = rounding(written, 3).max(1e-6);
     let rigid_residual = check_rigid_motion(body, rounded, limit, found);
     check_rigid_damping(body, found);
-    found.extend(check_rigid_responses(&body.recoveries, &body.rows, &body.nodes));
-    found.extend(refuse_stiff_preloads(&body.named_loads, &body.geometric_stiffness));
-    found.extend(check_preloads(&body.named_loads, &body.rows, &body.nodes));
-    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
+    found.extend(check_rigid_responses(&body.data.recoveries, &body.rows, &body.nodes));
+    found.extend(refuse_stiff_preloads(&body.data.named_loads, &body.data.geometric_stiffness));
+    found.extend(check_preloads(&body.data.named_loads, &body.rows, &body.nodes));
+    found.extend(missing_components(&body.data.geometric_stiffness, body.rows.dimension));
     Ok(rigid_residual)
 }
 
@@ -184,7 +179,7 @@ fn check_local_mass(
     let densities = Densities::new(body, &local, diagonal_mass);
     let density = check_density(body, densities, &local, found);
     if found.len() == before {
-        check_plausibility(&form.scalar, &body.nodes, &body.raw, found);
+        check_plausibility(&form.scalar, body, found);
     }
     check_speed(body, &local, density, found);
     let sound_speed = local.sound_speed(body.rows.dimension);
@@ -197,10 +192,10 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
 
 /// Adds notes about the kind of mass and of rows, unless they are plain.
 fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
-    let (raw, rows) = (&body.raw, &body.rows);
+    let (origin, rows) = (&body.origin, &body.rows);
     if diagonal_mass {
         let message = "mass matrix is diagonal: the program that wrote it lumped the mass";
-        found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
+        found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&origin.mass.path));
     }
     let [vectors, others] = rows.without_place();
     if !(vectors.is_empty() && others.is_empty()) {
@@ -214,7 +209,7 @@ fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnos
             others.len(),
             name_some(&labels)
         );
-        found.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&raw.nodes_path));
+        found.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&origin.nodes_path));
     }
 }
 
@@ -254,14 +249,14 @@ fn with_help_for_dependents(note: Diagnostic, follows: bool) -> Diagnostic {
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     /// Residual due to node tables with few digits.
     const MAX_RIGID_DAMPING: f64 = 1e-6;
-    if let Some(Damping::Rayleigh { alpha, .. }) = &body.damping {
+    if let Some(Damping::Rayleigh { alpha, .. }) = &body.data.damping {
         if *alpha > 0.0 {
             let message = "alpha M resists rigid motion; only the damping of the deformation is kept: that of motion relative to mean axes or, of a carried body, to its carrier";
             found.push(Diagnostic::new(Code::DampingRigid, message.to_owned()));
         }
         return;
     }
-    let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
+    let Some(damping) = body.data.damping.as_ref().and_then(Damping::matrix) else { return };
     let (centre, length) = centre_and_length(&body.nodes.positions);
     let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
     let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
@@ -280,12 +275,13 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
 /// for bodies other than solids.
 const PLAUSIBLE_DENSITY: (f64, f64) = (0.1, 30_000.0);
 
-fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {
-    if !raw.has_units() {
+fn check_plausibility(mass: &SymmetricMatrix, body: &Assembled, found: &mut Vec<Diagnostic>) {
+    if !body.has_units() {
         return;
     }
-    let total: f64 = mass.as_csc().values().iter().sum::<f64>() * raw.units.mass.to_si();
-    let [x, y, z] = extents(&nodes.positions).map(|extent| extent * raw.units.length.to_si());
+    let units = &body.data.description.units;
+    let total: f64 = mass.as_csc().values().iter().sum::<f64>() * units.mass.to_si();
+    let [x, y, z] = extents(&body.nodes.positions).map(|extent| extent * units.length.to_si());
     let volume = x * y * z;
     if volume <= 0.0 {
         return;
@@ -301,7 +297,7 @@ fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, fou
 
 /// Checks that K and M together make one body, and that K alone holds it together.
 fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
-    let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
+    let Assembled { origin, nodes, rows, stiffness, mass, .. } = body;
     let component = rows.components(&[stiffness]);
     if component.iter().all(|&c| c == 0) {
         return;
@@ -309,7 +305,7 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let bodies = groups(&rows.components(&[stiffness, mass]), rows, nodes);
     if bodies.len() > 1 {
         let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
-        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
+        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&origin.stiffness.path));
         return;
     }
     // K R = 0 holds for each part by itself: each has rigid motions of its own for any mass coupling.
@@ -319,7 +315,7 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
         parts.len(),
         in_words(&parts)
     );
-    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
+    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&origin.stiffness.path));
 }
 
 /// Returns the node numbers of every component, in the order of their first nodes.
@@ -337,15 +333,15 @@ const FREE_ROW_SUM: f64 = 1e-6;
 
 /// Returns an error if translations leave M free but not K.
 fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
-    let Assembled { raw, rows, stiffness, mass, .. } = body;
+    let Assembled { origin, rows, stiffness, mass, .. } = body;
     let (free_in_mass, free_in_stiffness) = (free_rows(mass, rows), free_rows(stiffness, rows));
     (free_in_mass > 0.5 && free_in_stiffness < 0.1).then(|| {
         let message = format!(
             "the matrix given as mass ({}) does not resist translations, like a stiffness matrix, and the one given as stiffness ({}) does, like a mass matrix: they are exchanged",
-            raw.mass.path.display(),
-            raw.stiffness.path.display()
+            origin.mass.path.display(),
+            origin.stiffness.path.display()
         );
-        Diagnostic::new(Code::MatricesExchanged, message).in_file(&raw.stiffness.path)
+        Diagnostic::new(Code::MatricesExchanged, message).in_file(&origin.stiffness.path)
     })
 }
 

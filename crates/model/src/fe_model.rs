@@ -6,6 +6,7 @@ pub(crate) mod drilling;
 pub(crate) mod element_around;
 pub(crate) mod inertial_rows;
 pub(crate) mod layout;
+pub(crate) mod origin;
 pub(crate) mod raw;
 pub(crate) mod references;
 pub(crate) mod soft_rotations;
@@ -13,12 +14,12 @@ pub(crate) mod soft_rotations;
 use crate::directors::mass_structure::MassForm;
 use crate::fe_model::assemble::Assembled;
 use crate::{
-    BodyNumber, Damping, DirectorMass, DofLabel, Followers, GeometricStiffness, GivenRows, ModelLoad,
-    ModelRecovery, NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
+    BodyNumber, Damping, Description, DirectorMass, DofLabel, Followers, GeometricStiffness, GivenRows,
+    ModelData, ModelLoad, ModelRecovery, NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
-use flexbody_base::provenance::{SourceFile, Sources};
+use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::{CscMatrix, EliminationOrder, Pencil, SymmetricMatrix, larger};
 use std::borrow::Cow;
@@ -28,10 +29,8 @@ use std::sync::{Arc, OnceLock};
 /// order of `nodes`, then the other rows given by [`rows`](FeModel::rows).
 #[derive(Debug, Clone)]
 pub struct FeModel {
-    name: String,
-    units: UnitSystem,
+    data: ModelData<SymmetricMatrix>,
     nodes: Nodes,
-    mesh: Option<SurfaceMesh>,
     rows: Rows,
     stiffness: SymmetricMatrix,
     soft_rotations: Arc<SoftRotations>,
@@ -42,12 +41,6 @@ pub struct FeModel {
     commutes: bool,
     /// True if M equals Ms kron I_d exactly.
     exact_scalar_mass: bool,
-    damping: Option<Damping<SymmetricMatrix>>,
-    geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
-    recoveries: Vec<ModelRecovery>,
-    named_loads: Vec<ModelLoad>,
-    interfaces: Vec<NodeSet>,
-    sources: Sources,
     digits: u8,
     rigid_residual: f64,
     mass_deviation: f64,
@@ -58,7 +51,6 @@ pub struct FeModel {
     /// equal.
     row_to_internal: Option<Vec<u32>>,
     given_rows: Arc<GivenRows>,
-    number: Option<BodyNumber>,
     elimination: EliminationOrder,
     /// Points with mass that follow nodes, if M is not Ms kron I_d.
     followers: Option<Arc<Followers>>,
@@ -67,34 +59,12 @@ pub struct FeModel {
 }
 
 impl FeModel {
-    pub(crate) fn new(
-        body: Assembled,
-        form: MassForm,
-        rigid_residual: f64,
-        diagonal_mass: bool,
-        number: Option<BodyNumber>,
-    ) -> Self {
-        let Assembled {
-            raw,
-            nodes,
-            mesh,
-            rows,
-            stiffness,
-            mass,
-            soft,
-            damping,
-            geometric_stiffness,
-            recoveries,
-            named_loads,
-            ..
-        } = body;
+    pub(crate) fn new(body: Assembled, form: MassForm, rigid_residual: f64, diagonal_mass: bool) -> Self {
+        let Assembled { data, nodes, rows, stiffness, mass, soft, .. } = body;
         let scalar = form.commutes && rows.len() == rows.displacements();
         Self {
-            digits: raw.stiffness.digits,
-            name: raw.name,
-            units: raw.units,
+            data,
             nodes,
-            mesh,
             rows,
             stiffness,
             soft_rotations: Arc::new(soft),
@@ -102,19 +72,13 @@ impl FeModel {
             whole_mass: (!scalar).then_some(mass),
             commutes: form.commutes,
             exact_scalar_mass: form.commutes && form.exact,
-            damping,
-            geometric_stiffness,
-            recoveries,
-            named_loads,
-            interfaces: raw.interfaces,
-            sources: raw.sources,
+            digits: body.origin.stiffness.digits,
             rigid_residual,
             mass_deviation: form.deviation,
             fixed_mass_share: 0.0,
             diagonal_mass,
             row_to_internal: body.row_to_internal,
-            given_rows: Arc::new(raw.given_rows),
-            number,
+            given_rows: Arc::new(body.given_rows),
             elimination: EliminationOrder::default(),
             followers: None,
             director_mass: OnceLock::new(),
@@ -153,9 +117,14 @@ impl FeModel {
         !self.rows.rotations().is_empty() || self.followers.as_ref().is_some_and(|points| points.turn())
     }
 
+    /// Returns name and units of the model.
+    pub fn description(&self) -> &Description {
+        &self.data.description
+    }
+
     /// Returns the name of the model.
     pub fn name(&self) -> &str {
-        &self.name
+        &self.data.description.name
     }
 
     /// Returns the number of displacements per node: 3, or 2 for a body in the plane.
@@ -165,7 +134,7 @@ impl FeModel {
 
     /// Returns the units of all numbers.
     pub fn units(&self) -> &UnitSystem {
-        &self.units
+        &self.data.description.units
     }
 
     /// Returns the nodes with degrees of freedom, in the order of the node table.
@@ -175,7 +144,7 @@ impl FeModel {
 
     /// Returns the surface, by indices of the nodes, if elements are known.
     pub fn mesh(&self) -> Option<&SurfaceMesh> {
-        self.mesh.as_ref()
+        self.data.mesh.as_ref()
     }
 
     /// Returns K: row d i + k for direction k of node i, then the other rows.
@@ -257,23 +226,23 @@ impl FeModel {
 
     /// Returns the damping, if given; a matrix D has the rows of K.
     pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
-        self.damping.as_ref()
+        self.data.damping.as_ref()
     }
 
     /// Returns the geometric stiffness of unit loads along the axes of the model, if given, with the rows
     /// of K.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
-        &self.geometric_stiffness
+        &self.data.geometric_stiffness
     }
 
     /// Returns the rows to read off the body; operators have the internal rows.
     pub fn recoveries(&self) -> &[ModelRecovery] {
-        &self.recoveries
+        &self.data.recoveries
     }
 
     /// Returns the nodal forces with a name, by internal rows.
     pub fn named_loads(&self) -> &[ModelLoad] {
-        &self.named_loads
+        &self.data.named_loads
     }
 
     /// Returns the elimination order shared by all factors of [`pencil`](Self::pencil).
@@ -304,7 +273,7 @@ impl FeModel {
 
     /// Returns the named node sets.
     pub fn interfaces(&self) -> &[NodeSet] {
-        &self.interfaces
+        &self.data.interfaces
     }
 
     /// Computes the fingerprints of the files of the model that were not computed while reading.
@@ -312,12 +281,12 @@ impl FeModel {
     /// # Errors
     /// FB101, FB132 for a file that changed since it was read.
     pub(crate) fn find_sources(&self) -> Result<(), Diagnostic> {
-        self.sources.find()
+        self.data.sources.find()
     }
 
     /// Returns the files that the model was read from.
     pub fn sources(&self) -> &[SourceFile] {
-        &self.sources
+        &self.data.sources
     }
 
     /// Returns the significant decimal digits of the stiffness values.
@@ -401,7 +370,7 @@ impl FeModel {
     /// Returns the number of this body if the matrices held several bodies; `None` for a model that was not
     /// split.
     pub fn number(&self) -> Option<BodyNumber> {
-        self.number
+        self.data.description.number
     }
 
     /// Returns the label of an internal row.

@@ -2,7 +2,7 @@
 
 use flexbody_body::flex_body::Frame;
 use flexbody_body::invariants::BodyFrame;
-use flexbody_model::{Damping, FeModel, RawModel};
+use flexbody_model::{Damping, FeModel};
 use flexbody_motion::dynamics::{
     BodyPoint, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes,
     LoadJacobian, Motion, NodalConfiguration, NodalEquations, NodalEvaluation, NodalMotion, Orientation,
@@ -95,7 +95,7 @@ fn evaluations_allocate_nothing() {
 fn nodal_evaluations_allocate_nothing() {
     for name in ["bracket_hex20", "frame_lumped", "shell_folded", "plane_frame"] {
         let raw =
-            RawModel { damping: Some(Damping::Rayleigh { alpha: 0.1, beta: 1e-3 }), ..raw_fixture(name) };
+            raw_fixture(name).with(|data| data.damping = Some(Damping::Rayleigh { alpha: 0.1, beta: 1e-3 }));
         let model = FeModel::from_raw(raw).expect("a body").model;
         let frame = Frame::model();
         let equations =

@@ -23,7 +23,7 @@ pub fn bracket(couplings: [Coupling; 2]) -> RawModel {
     let far = Reference::Point([0.5, 0.3, 0.9]);
     let references =
         [Reference::Centre, if couplings[1] == Coupling::Free { Reference::Centre } else { far }];
-    raw.interfaces = ["first", "second"]
+    raw.data.interfaces = ["first", "second"]
         .into_iter()
         .zip(sets)
         .zip(couplings.into_iter().zip(references))
@@ -41,7 +41,7 @@ pub fn strip(couplings: [Coupling; 2]) -> RawModel {
     let mut raw = rectangle(8, 3, 0.4, [0.3, -0.1]);
     let last = raw.nodes.len() as i64;
     let ends = [(1..=last).step_by(9).collect(), (9..=last).step_by(9).collect()];
-    raw.interfaces = ["first", "second"]
+    raw.data.interfaces = ["first", "second"]
         .into_iter()
         .zip(ends)
         .zip(couplings)
@@ -60,6 +60,6 @@ pub fn footed_block() -> RawModel {
         (0..mesh.nodes.len()).filter(|&i| mesh.nodes[i][0] < 0.1).map(|i| i as i64 + 1).collect();
     let turned = mesh.moved(&Random(11).rotation(), [2.0, -3.0, 1.0]);
     let mut raw = turned.assemble(&rubber, MassRule::Consistent).raw_model();
-    raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("foot", ids) }];
+    raw.data.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("foot", ids) }];
     raw
 }

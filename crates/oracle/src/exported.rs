@@ -41,8 +41,8 @@ pub fn jointed(
     coupling: Coupling,
     damping: Option<Damping<flexbody_model::RawMatrix>>,
 ) -> FlexBody {
-    let mut raw = RawModel { damping, ..raw_fixture(name) };
-    raw.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(coupling));
+    let mut raw = raw_fixture(name).with(|data| data.damping = damping);
+    raw.data.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(coupling));
     body_of(raw, BasisChoice::CraigBampton(CraigBampton), BodyFrame::Model)
 }
 
@@ -78,10 +78,8 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
         let mut all: Vec<(String, FlexBody)> =
             models().into_iter().map(|name| (name.clone(), free(raw_fixture(&name)))).collect();
         all.extend(jointed_bodies().iter().cloned());
-        let damped = RawModel {
-            damping: Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }),
-            ..raw_fixture("frame_beams")
-        };
+        let damped = raw_fixture("frame_beams")
+            .with(|data| data.damping = Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }));
         all.push((
             "frame_beams, Rayleigh, not at its centre".to_owned(),
             body_of(damped, BasisChoice::default(), BodyFrame::Model),
@@ -103,9 +101,9 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
 pub fn on_interfaces() -> Vec<(String, FlexBody)> {
     let made = |name: &str| {
         let mut raw =
-            RawModel { damping: Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }), ..raw_fixture(name) };
-        raw.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(Coupling::Rigid));
-        let frame = FrameChoice::Interface(raw.interfaces[0].name.clone());
+            raw_fixture(name).with(|data| data.damping = Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }));
+        raw.data.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(Coupling::Rigid));
+        let frame = FrameChoice::Interface(raw.data.interfaces[0].name.clone());
         let model = FeModel::from_raw(raw).expect("a body").model;
         let basis = BasisChoice::CraigBampton(CraigBampton);
         let mut settings = ConvertSettings { basis, frame, ..ConvertSettings::default() };

@@ -13,7 +13,7 @@ use flexbody_body::flex_body::{
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,
 };
-use flexbody_model::{BodyNumber, Coupling, NodeMoments, Nodes};
+use flexbody_model::{BodyNumber, Coupling, Description, NodeMoments, Nodes};
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -243,17 +243,18 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
     let mass_structure = MassStructure::ALL[r.below(3)];
     let general = (mass_structure == MassStructure::General).then(|| r.general(nf));
     let wild = r.wild;
+    let name = r.name();
+    let files = (0..r.below(4))
+        .map(|i| SourceFile {
+            role: format!("role{i}"),
+            name: r.name(),
+            sha256: format!("{:064x}", r.bits()),
+        })
+        .collect();
+    let number = (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) });
     let mut parts = Parts {
         source: Source {
-            name: r.name(),
-            files: (0..r.below(4))
-                .map(|i| SourceFile {
-                    role: format!("role{i}"),
-                    name: r.name(),
-                    sha256: format!("{:064x}", r.bits()),
-                })
-                .collect(),
-            number: (r.below(2) == 1).then(|| BodyNumber { number: 2, of: 2 + r.below(3) }),
+            files,
             n_dofs: 3 * n,
             mass_structure,
             approximation: (mass_structure == MassStructure::General).then(|| "Ω \"10 %\"".to_owned()),
@@ -261,8 +262,8 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
                 "modes": nf, "shift": r.value(), "nul": "\u{0}", "list": [null, true, "ß"], "big": u64::MAX,
             }),
         },
+        description: Description { name, number, units: units[r.below(3)].clone() },
         dimension: 3,
-        units: units[r.below(3)].clone(),
         frame: Frame { origin: Vector3::from_fn(|_, _| r.value()), axes: *axes.matrix() },
         conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes {
@@ -441,7 +442,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
             ))
             .collect::<Vec<_>>(),
         p.source,
-        p.units,
+        p.description.units,
         p.nodes.ids,
         p.interfaces,
         p.geometric_stiffness.iter().map(|g| &g.load).collect::<Vec<_>>(),

@@ -87,9 +87,13 @@ pub fn write_model(folder: &Path, raw: &RawModel, triangle: Triangle) -> PathBuf
         writeln!(nodes, "{id},{x:e},{y:e},{z:e}").expect("to a string");
     }
     save("nodes.csv", nodes);
-    let mut manifest = format!("[model]\nname = \"{}\"\n", raw.name);
-    if raw.units.stated {
-        let (l, m, t) = (raw.units.length.name(), raw.units.mass.name(), raw.units.time.name());
+    let mut manifest = format!("[model]\nname = \"{}\"\n", raw.data.description.name);
+    if raw.data.description.units.stated {
+        let (l, m, t) = (
+            raw.data.description.units.length.name(),
+            raw.data.description.units.mass.name(),
+            raw.data.description.units.time.name(),
+        );
         writeln!(manifest, "[model.units]\nlength = \"{l}\"\nmass = \"{m}\"\ntime = \"{t}\"")
             .expect("to a string");
     }

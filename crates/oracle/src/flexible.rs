@@ -17,7 +17,7 @@ use flexbody_body::invariants::{BodyFrame, GeneralTerms, Invariants, PrimaryData
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::context::Context;
-use flexbody_model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
+use flexbody_model::{Description, FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -102,17 +102,15 @@ pub fn made_of(
     let nf = invariants.n_modes();
     let general = invariants.general().is_some();
     FlexBody::new(Parts {
+        description: Description::new("random", UnitSystem::default()),
         source: Source {
-            name: "random".to_owned(),
             files: Vec::new(),
-            number: None,
             n_dofs: 3 * positions.len(),
             mass_structure: if general { MassStructure::General } else { MassStructure::RotationInvariant },
             approximation: None,
             settings: serde_json::Value::Null,
         },
         dimension: 3,
-        units: UnitSystem::default(),
         frame: Frame::model(),
         conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes { ids: (1..=positions.len() as i64).collect(), positions },

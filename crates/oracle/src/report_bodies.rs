@@ -15,7 +15,7 @@ use flexbody_body::invariants::{
     BodyFrame, ERROR_NORMS, Frame, Invariants, PrimaryData, TermGroups, choose_frame, condense,
 };
 use flexbody_linalg::SymmetricMatrix;
-use flexbody_model::{Coupling, Nodes};
+use flexbody_model::{Coupling, Description, Nodes};
 use flexbody_report::{Phase, RunData, SearchAttempt};
 use nalgebra::{Matrix3, Vector3};
 
@@ -72,21 +72,19 @@ pub fn engine_mount() -> FlexBody {
         sha256: digit.repeat(64),
     };
     FlexBody::new(Parts {
+        description: Description::new("engine mount", UnitSystem::parse("m", "kg", "s").unwrap()),
         source: Source {
-            name: "engine mount".to_owned(),
             files: vec![
                 file("stiffness", "K.mtx.gz", "1"),
                 file("mass", "M.mtx.gz", "2"),
                 file("nodes", "nodes.csv", "3"),
             ],
-            number: None,
             n_dofs: 24,
             mass_structure: MassStructure::RotationInvariant,
             approximation: None,
             settings: serde_json::json!({ "accuracy": "standard", "frame": "principal", "modes": 8 }),
         },
         dimension: 3,
-        units: UnitSystem::parse("m", "kg", "s").unwrap(),
         frame: Frame { origin: Vector3::new(0.125, 0.0, -0.0625), axes: Matrix3::identity() },
         conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes {
@@ -246,17 +244,15 @@ pub fn condensed(
     let stiffness = Mat::from_fn(6, 6, |p, q| if p == q { EIGENVALUES[p] } else { 0.0 });
     let invariants = condense(mass, &positions, shape.as_ref(), stiffness);
     FlexBody::new(Parts {
+        description: Description::new("block", UnitSystem::default()),
         source: Source {
-            name: "block".to_owned(),
             files: vec![],
-            number: None,
             n_dofs: 3 * ids.len(),
             mass_structure: MassStructure::RotationInvariant,
             approximation: None,
             settings: serde_json::json!({}),
         },
         dimension: 3,
-        units: UnitSystem::default(),
         frame,
         conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes { ids, positions },

@@ -141,7 +141,7 @@ impl View {
         let data =
             ShownBody::new(body, &drawing, &fields.drawn, entries, shown.as_ref(), colouring.is_some());
         let mut facts = ViewFacts {
-            model: body.source().name.clone(),
+            model: body.description().name.clone(),
             modes: if is_still { 0 } else { body.n_modes() },
             drawn: drawing.kind(),
             nodes: body.n_nodes(),

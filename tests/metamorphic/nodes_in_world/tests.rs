@@ -13,7 +13,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
-use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
+use flexbody_model::{Coupling, FeModel, NodeSet};
 use flexbody_motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Load, Point, Recording, Scene, Spin, VectorHistory, simulate,
 };
@@ -83,7 +83,7 @@ fn block() -> Block {
     let root: Vec<usize> = (0..mesh.nodes.len()).filter(|&i| mesh.nodes[i][0] < 1.1).collect();
     let ids = root.iter().map(|&i| i as i64 + 1).collect();
     let interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("root", ids) }];
-    let raw = RawModel { interfaces, ..assembly.raw_model() };
+    let raw = assembly.raw_model().with(|data| data.interfaces = interfaces);
     let matrix = |a| {
         let a = dense(a);
         DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])

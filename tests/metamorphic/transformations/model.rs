@@ -42,8 +42,8 @@ pub fn renumber(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> 
     changed.raw.dofs = Some(labels);
     changed.raw.nodes.ids.iter_mut().for_each(number);
     changed.raw.dofs.iter_mut().flatten().for_each(|label| number(&mut label.node));
-    changed.raw.interfaces.iter_mut().flat_map(|set| &mut set.nodes).for_each(number);
-    recoveries::renumber(&mut changed.raw.recoveries, number);
+    changed.raw.data.interfaces.iter_mut().flat_map(|set| &mut set.nodes).for_each(number);
+    recoveries::renumber(&mut changed.raw.data.recoveries, number);
     let point = |point: &mut Point| {
         if let Point::Node(id) = point {
             number(id);
@@ -70,20 +70,20 @@ pub fn permute(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     };
     let mut changed = subject.clone();
     (changed.raw.stiffness, changed.raw.mass) = (permuted(&raw.stiffness), permuted(&raw.mass));
-    if let Some(Damping::Matrix(matrix)) = &raw.damping {
-        changed.raw.damping = Some(Damping::Matrix(permuted(matrix)));
+    if let Some(Damping::Matrix(matrix)) = &raw.data.damping {
+        changed.raw.data.damping = Some(Damping::Matrix(permuted(matrix)));
     }
-    for stiffness in &mut changed.raw.geometric_stiffness {
+    for stiffness in &mut changed.raw.data.geometric_stiffness {
         stiffness.matrix = permuted(&stiffness.matrix);
     }
-    changed.raw.recoveries = recoveries::permuted(raw, &place);
-    changed.raw.named_loads = named_loads::permuted(raw, &place);
+    changed.raw.data.recoveries = recoveries::permuted(raw, &place);
+    changed.raw.data.named_loads = named_loads::permuted(raw, &place);
     changed.raw.followers = carried_mass::permuted(raw, &place);
     changed.raw.dofs = Some(order.iter().map(|&old| labels[old]).collect());
     let nodes = random.permutation(raw.nodes.len());
     changed.raw.nodes.ids = nodes.iter().map(|&i| raw.nodes.ids[i]).collect();
     changed.raw.nodes.positions = nodes.iter().map(|&i| raw.nodes.positions[i]).collect();
-    changed.raw.interfaces.iter_mut().for_each(|set| set.nodes.reverse());
+    changed.raw.data.interfaces.iter_mut().for_each(|set| set.nodes.reverse());
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
@@ -163,7 +163,7 @@ fn combined(raw: &RawModel, terms: &[(f64, &CscMatrix)], turn: &Matrix3<f64>) ->
 
 /// Returns the geometric stiffness of the rotated unit loads.
 pub fn geometric(raw: &RawModel, turn: &Matrix3<f64>) -> Vec<GeometricStiffness<RawMatrix>> {
-    let all = &raw.geometric_stiffness;
+    let all = &raw.data.geometric_stiffness;
     let own = |one: &GeometricStiffness<RawMatrix>| {
         let same_kind = all.iter().filter(|other| other.load.kind == one.load.kind);
         let terms: Vec<(f64, &CscMatrix)> = same_kind

@@ -54,13 +54,13 @@ impl Motion {
     fn raw(&self, raw: &RawModel) -> RawModel {
         let mut moved = raw.clone();
         moved.nodes.positions.iter_mut().for_each(|x| *x = self.place(*x));
-        for set in &mut moved.interfaces {
+        for set in &mut moved.data.interfaces {
             if let Reference::Point(x) = set.reference {
                 set.reference = Reference::Point(self.place(x));
             }
         }
-        moved.recoveries = recoveries::moved(raw, &self.model, |x| self.place(x));
-        moved.named_loads = named_loads::turned(raw, &self.model);
+        moved.data.recoveries = recoveries::moved(raw, &self.model, |x| self.place(x));
+        moved.data.named_loads = named_loads::turned(raw, &self.model);
         moved.followers = carried_mass::moved(raw, &self.model, |x| self.place(x));
         if self.model != Matrix3::identity() {
             let turned = |matrix: &RawMatrix| RawMatrix {
@@ -68,10 +68,10 @@ impl Motion {
                 ..matrix.clone()
             };
             (moved.stiffness, moved.mass) = (turned(&raw.stiffness), turned(&raw.mass));
-            if let Some(Damping::Matrix(matrix)) = &raw.damping {
-                moved.damping = Some(Damping::Matrix(turned(matrix)));
+            if let Some(Damping::Matrix(matrix)) = &raw.data.damping {
+                moved.data.damping = Some(Damping::Matrix(turned(matrix)));
             }
-            moved.geometric_stiffness = geometric(raw, &self.model);
+            moved.data.geometric_stiffness = geometric(raw, &self.model);
         }
         moved
     }

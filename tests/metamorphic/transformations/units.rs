@@ -59,21 +59,21 @@ impl Units {
         let mut changed = raw.clone();
         let place = |x: &mut [f64; 3]| x.iter_mut().for_each(|x| *x *= self.length);
         changed.nodes.positions.iter_mut().for_each(place);
-        for set in &mut changed.interfaces {
+        for set in &mut changed.data.interfaces {
             if let Reference::Point(x) = &mut set.reference {
                 place(x);
             }
         }
         changed.stiffness = self.matrix(raw, &raw.stiffness, self.stiffness());
         changed.mass = self.matrix(raw, &raw.mass, self.mass);
-        match &mut changed.damping {
+        match &mut changed.data.damping {
             Some(Damping::Rayleigh { alpha, beta }) => {
                 (*alpha, *beta) = (*alpha / self.time, *beta * self.time)
             }
             Some(Damping::Matrix(matrix)) => *matrix = self.matrix(raw, matrix, self.mass / self.time),
             _ => {}
         }
-        for own in &mut changed.geometric_stiffness {
+        for own in &mut changed.data.geometric_stiffness {
             let load = match own.load.kind {
                 LoadKind::Acceleration => self.length / (self.time * self.time),
                 LoadKind::AngularAcceleration | LoadKind::Spin => 1.0 / (self.time * self.time),
@@ -83,10 +83,10 @@ impl Units {
             };
             own.matrix = self.matrix(raw, &own.matrix, self.stiffness() / load);
         }
-        changed.recoveries = recoveries::scaled(raw, self.length);
-        changed.named_loads = named_loads::scaled(raw, self.force(), self.length);
+        changed.data.recoveries = recoveries::scaled(raw, self.length);
+        changed.data.named_loads = named_loads::scaled(raw, self.force(), self.length);
         changed.followers = carried_mass::scaled(raw, self.length, self.mass);
-        changed.units = self.named(&raw.units);
+        changed.data.description.units = self.named(&raw.data.description.units);
         changed
     }
 

@@ -32,7 +32,7 @@ fn bar() -> RawModel {
         let nodes = straight.nodes.iter().enumerate().filter(|(_, node)| (node[0] - x).abs() < 1e-9);
         nodes.map(|(i, _)| i as i64 + 1).collect()
     };
-    raw.interfaces = [("root", 0.0), ("tip", 1.0)]
+    raw.data.interfaces = [("root", 0.0), ("tip", 1.0)]
         .map(|(name, x)| NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new(name, end(x)) })
         .to_vec();
     raw
@@ -63,7 +63,7 @@ fn with_all_modes_the_eigenvalues_are_those_of_the_held_model() {
     let conversion = on_interface(&model, "root", BasisChoice::default(), ALL).expect("a body");
     let body = conversion.body;
     assert_eq!(*body.conditions(), ReferenceConditions::Interface("root".to_owned()));
-    let held = HeldModel::new(&raw, &raw.interfaces[0].nodes);
+    let held = HeldModel::new(&raw, &raw.data.interfaces[0].nodes);
     for (own, expected) in body.modes().eigenvalue.iter().zip(held.eigenvalues()) {
         assert!((own / expected - 1.0).abs() < 1e-8, "{own:e}, {expected:e}");
     }
@@ -79,7 +79,7 @@ fn with_all_modes_the_eigenvalues_are_those_of_the_held_model() {
 fn every_identity_holds_for_every_kind_of_model() {
     let mut plane = rectangle(5, 2, 0.7, [1.0, 2.0]);
     let ids: Vec<i64> = plane.nodes.ids.iter().copied().take(3).collect();
-    plane.interfaces = vec![NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new("foot", ids) }];
+    plane.data.interfaces = vec![NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new("foot", ids) }];
     let models = [
         ("bracket_hex20", raw_fixture("bracket_hex20")),
         ("robot_link", raw_fixture("robot_link")),
@@ -88,10 +88,10 @@ fn every_identity_holds_for_every_kind_of_model() {
         ("plane", plane),
     ];
     for (name, mut raw) in models {
-        for interface in &mut raw.interfaces {
+        for interface in &mut raw.data.interfaces {
             interface.coupling = interface.coupling.or(Some(Coupling::Rigid));
         }
-        let interface = raw.interfaces[0].name.clone();
+        let interface = raw.data.interfaces[0].name.clone();
         let model = checked(raw);
         for basis in [BasisChoice::default(), BasisChoice::CraigBampton(CraigBampton)] {
             let what = format!("{name}, {basis:?}");
@@ -126,10 +126,11 @@ fn is_the_body_in_mean_axes(body: &FlexBody, model: &FeModel, basis: BasisChoice
 #[test]
 fn what_no_frame_can_stand_on_is_refused() {
     let mut raw = bar();
-    let line = raw.interfaces[0].nodes[..2].to_vec();
-    raw.interfaces
+    let line = raw.data.interfaces[0].nodes[..2].to_vec();
+    raw.data
+        .interfaces
         .push(NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("line", line.clone()) });
-    raw.interfaces.push(NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new("free", line) });
+    raw.data.interfaces.push(NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new("free", line) });
     let model = checked(raw);
     for (name, code, words) in [
         ("nowhere", Code::SceneBody, "root, tip, line, free"),

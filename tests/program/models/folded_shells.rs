@@ -76,9 +76,9 @@ fn folded_shells_have_the_frequencies_of_calculix() {
 fn edges_and_folds_are_interfaces() {
     for (name, [at_edge, at_fold]) in [("s4", [6, 3]), ("s8", [8, 3])] {
         let raw = job(&deck(name), vec![set("edge", "EDGE"), set("fold", "FOLD")]);
-        let counts: Vec<usize> = raw.interfaces.iter().map(|interface| interface.nodes.len()).collect();
+        let counts: Vec<usize> = raw.data.interfaces.iter().map(|interface| interface.nodes.len()).collect();
         assert_eq!(counts, [at_edge, at_fold], "{name}");
-        assert!(raw.mesh.as_ref().is_some_and(|mesh| !mesh.triangles().is_empty()), "{name}");
+        assert!(raw.data.mesh.as_ref().is_some_and(|mesh| !mesh.triangles().is_empty()), "{name}");
         let model = FeModel::from_raw(raw).expect("a model").model;
         let middle = model.interfaces()[0].reference.point().expect("a point");
         let exact = [0.5 * LENGTH, WIDTHS[0], 0.0];
@@ -116,7 +116,7 @@ fn rows_of_other_knots_are_refused() {
     };
     read("nothing", "nothing").expect("the deck");
     let refused = |from: &str, to: &str| -> String {
-        let error = read(from, to).map(|raw: RawModel| raw.name).expect_err(to);
+        let error = read(from, to).map(|raw: RawModel| raw.data.description.name).expect_err(to);
         assert!(error.has(Code::DeckUnsupported), "{error}");
         error.to_string()
     };

@@ -42,7 +42,7 @@ fn plate() -> (RawModel, Vec<i64>) {
         let ids: Vec<i64> = nodes.iter().map(|&node| node as i64 + 1).collect();
         elements.add("C3D10", ElementShape::Tetrahedron, &ids);
     }
-    raw.mesh = skin(&elements, &raw.nodes).mesh;
+    raw.data.mesh = skin(&elements, &raw.nodes).mesh;
     (raw, bore)
 }
 
@@ -68,7 +68,7 @@ fn the_centre_of_a_hole_is_that_of_its_faces() {
     let (mut raw, bore) = plate();
     for coupling in [Coupling::Averaging, Coupling::Rigid] {
         let set = NodeSet { coupling: Some(coupling), ..NodeSet::new("bore", bore.clone()) };
-        raw.interfaces = vec![set];
+        raw.data.interfaces = vec![set];
         let CheckedModel { model, diagnostics, .. } = checked(raw.clone());
         let point = model.interfaces()[0].reference.point().expect("a point");
         assert!(away(point, CENTRE) < 0.004 * RADIUS, "{point:?}");
@@ -79,7 +79,7 @@ fn the_centre_of_a_hole_is_that_of_its_faces() {
         let place = body.frame().to_model(interface.reference.expect("a point"));
         assert!(away(place, point) < 1e-15);
     }
-    raw.mesh = None;
+    raw.data.mesh = None;
     let model = checked(raw).model;
     let mean = model.interfaces()[0].reference.point().expect("a point");
     assert!(away(mean, CENTRE) > 0.2 * RADIUS, "{mean:?}");
@@ -95,7 +95,7 @@ fn rims_have_the_centre_of_their_edges_and_stated_points_stay() {
     let on_rim = |id: &i64| (positions[*id as usize - 1][2] - lowest).abs() < 1e-9;
     let rim: Vec<i64> = bore.iter().copied().filter(on_rim).collect();
     let stated = Reference::Point([0.3, -0.2, 0.06]);
-    raw.interfaces = vec![
+    raw.data.interfaces = vec![
         NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("rim", rim.clone()) },
         NodeSet { reference: stated, coupling: Some(Coupling::Averaging), ..NodeSet::new("stated", bore) },
         NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new("free", rim) },
@@ -158,7 +158,7 @@ fn bodies_of_earlier_versions_keep_the_mean_of_the_nodes() {
     let (raw, bore) = plate();
     let with = |reference| {
         let set = NodeSet { reference, ..NodeSet::new("bore", bore.clone()) };
-        checked(RawModel { interfaces: vec![set], ..raw.clone() }).model
+        checked(raw.clone().with(|data| data.interfaces = vec![set])).model
     };
     let sum = bore.iter().fold([0.0; 3], |sum, &id| {
         let x = raw.nodes.positions[id as usize - 1];

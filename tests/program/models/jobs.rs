@@ -36,11 +36,11 @@ fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
     assert_eq!(of(901), [] as [u8; 0], "the rotation node is no node");
     assert!(!raw.nodes.ids.contains(&901));
     assert_eq!(of(906), [1, 2, 3], "an internal node of the first brick");
-    assert_eq!(raw.interfaces[0].nodes.len(), 4);
-    assert!(raw.interfaces[1].nodes.iter().all(|node| !of(*node).is_empty()), "nodes with rows only");
-    let roles: Vec<&str> = raw.sources.iter().map(|source| source.role.as_str()).collect();
+    assert_eq!(raw.data.interfaces[0].nodes.len(), 4);
+    assert!(raw.data.interfaces[1].nodes.iter().all(|node| !of(*node).is_empty()), "nodes with rows only");
+    let roles: Vec<&str> = raw.data.sources.iter().map(|source| source.role.as_str()).collect();
     assert_eq!(roles, ["deck", "deck", "stiffness", "mass", "dofs"]);
-    let names: Vec<&str> = raw.sources.iter().map(|source| source.name.as_str()).collect();
+    let names: Vec<&str> = raw.data.sources.iter().map(|source| source.name.as_str()).collect();
     assert_eq!(names, ["job.inp", "nodes.inp", "job.sti", "job.mas", "job.dof"]);
     assert_is_the_block(&body(raw, 6));
 }
@@ -178,7 +178,7 @@ fn couplings_that_do_not_explain_the_rows_are_refused() {
 fn quadratic_shells_of_calculix_are_told_apart() {
     let raw = job(&small("calculix_shells"), vec![set("left", "LEFT")]);
     assert_eq!(
-        raw.interfaces[0].nodes.len(),
+        raw.data.interfaces[0].nodes.len(),
         8,
         "an edge has the nodes on both faces and those between them"
     );
@@ -204,12 +204,12 @@ fn quadratic_shells_of_calculix_are_told_apart() {
 fn both_forms_of_abaqus_are_one_model() {
     let bodies = ["abaqus", "abaqus_labels"].map(|name| {
         let raw = job(&small(name), vec![set("left", "left")]);
-        assert_eq!(raw.interfaces[0].nodes.len(), 4);
+        assert_eq!(raw.data.interfaces[0].nodes.len(), 4);
         let lies_left = |node: &i64| {
             let at = raw.nodes.ids.iter().position(|id| id == node).expect("a node");
             raw.nodes.positions[at][0].abs() < 1e-12
         };
-        assert!(raw.interfaces[0].nodes.iter().all(lies_left), "the instance turns and moves the part");
+        assert!(raw.data.interfaces[0].nodes.iter().all(lies_left), "the instance turns and moves the part");
         body(raw, 8)
     });
     bodies.iter().for_each(assert_is_the_block);
@@ -231,9 +231,9 @@ fn manifests_and_command_lines_take_jobs() {
         [[interface]]\nname = \"near\"\nnearest = { point = [0.3, 0.04, 0.03], count = 4 }\n";
     fs::write(place.join("model.toml"), text).expect("written");
     let raw = read_model(&read_manifest(place.join("model.toml")).expect("a manifest")).expect("readable");
-    let right = &raw.interfaces[0].nodes;
+    let right = &raw.data.interfaces[0].nodes;
     assert_eq!(right.len(), 4);
-    for interface in &raw.interfaces[1..] {
+    for interface in &raw.data.interfaces[1..] {
         let mut nodes = interface.nodes.clone();
         nodes.sort_unstable();
         let mut right = right.clone();

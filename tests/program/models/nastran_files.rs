@@ -196,9 +196,9 @@ fn continuations_are_found_by_their_names() {
             assert!(found.expect_err("79 rows").has(Code::DeckRows));
             replace(&path, "GRID,90,,0.,0.,0.", "PARAM,B,2");
         } else {
-            assert_eq!(found.expect("read").mesh, expected.mesh, "{new}");
+            assert_eq!(found.expect("read").data.mesh, expected.data.mesh, "{new}");
         }
-        assert_eq!(read(&path).expect("read").mesh, expected.mesh, "{new}");
+        assert_eq!(read(&path).expect("read").data.mesh, expected.data.mesh, "{new}");
     }
 }
 

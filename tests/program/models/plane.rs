@@ -182,7 +182,7 @@ fn what_leaves_the_plane_is_refused() {
 #[test]
 fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
     let raw = rectangle(4, 2, 0.7, [1.0, 2.0]);
-    let raw = RawModel { interfaces: vec![NodeSet::new("corner", vec![1])], ..raw };
+    let raw = raw.with(|data| data.interfaces = vec![NodeSet::new("corner", vec![1])]);
     let n = 2 * raw.nodes.len();
     let last = raw.nodes.len() - 1;
     // Strings from the first node to two others apply a unit force along an axis to it.
@@ -206,7 +206,7 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
         matrix: RawMatrix { matrix: matrix_of(ratios(component)), ..raw.stiffness.clone() },
         load: UnitLoad { kind, component },
     };
-    let with = |geometric_stiffness| RawModel { geometric_stiffness, ..raw.clone() };
+    let with = |geometric_stiffness| raw.clone().with(|data| data.geometric_stiffness = geometric_stiffness);
     let force = || LoadKind::Force("corner".to_owned());
     let sound = model(with(vec![given(LoadKind::Named("strings".to_owned()), 0), given(force(), 0)]));
     let body = converted(&sound, 6, BodyFrame::Principal).body;

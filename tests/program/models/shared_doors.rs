@@ -137,7 +137,7 @@ fn sets_of_the_assembly_are_those_of_its_instances() {
     let nodes = |name: &str| {
         let interface = oracle::jobs::set("a", name);
         let mut raw = oracle::jobs::job(&folder.join("job.inp"), vec![interface]);
-        raw.interfaces.remove(0).nodes
+        raw.data.interfaces.remove(0).nodes
     };
     assert_eq!(nodes("DOTTED"), [1, 101]);
     assert_eq!(nodes("ONE"), [136]);
@@ -145,6 +145,6 @@ fn sets_of_the_assembly_are_those_of_its_instances() {
     assert_eq!(nodes("B.TIP"), [134, 135, 136]);
     if let Some(folder) = case("05a_ccx_dotted_set") {
         let raw = oracle::jobs::job(&folder.join("job.inp"), vec![oracle::jobs::set("a", "SUP")]);
-        assert_eq!(raw.interfaces[0].nodes, [28, 29, 30, 31]);
+        assert_eq!(raw.data.interfaces[0].nodes, [28, 29, 30, 31]);
     }
 }

@@ -61,15 +61,14 @@ fn interleaved(bodies: &[RawModel]) -> RawModel {
     }
     let interfaces = bodies.iter().enumerate().flat_map(|(b, body)| {
         let nodes = move |set: &NodeSet| set.nodes.iter().map(|&node| id(b, node)).collect();
-        body.interfaces.iter().map(move |set| NodeSet::new(format!("{}{b}", set.name), nodes(set)))
+        body.data.interfaces.iter().map(move |set| NodeSet::new(format!("{}{b}", set.name), nodes(set)))
     });
     RawModel {
         stiffness: merged(&|body| &body.stiffness),
         mass: merged(&|body| &body.mass),
-        interfaces: interfaces.collect(),
         nodes: whole,
         dofs: Some(dofs),
-        ..bodies[0].clone()
+        ..bodies[0].clone().with(|data| data.interfaces = interfaces.collect())
     }
 }
 
@@ -79,7 +78,7 @@ fn alone(bodies: &[RawModel], body: usize) -> RawModel {
     let mut raw = bodies[body].clone();
     raw.dofs = Some(labels(&raw).iter().map(|l| DofLabel { node: number(l.node), ..*l }).collect());
     raw.nodes.ids.iter_mut().for_each(|node| *node = number(*node));
-    for set in &mut raw.interfaces {
+    for set in &mut raw.data.interfaces {
         set.name = format!("{}{body}", set.name);
         set.nodes.iter_mut().for_each(|node| *node = number(*node));
     }
@@ -91,8 +90,8 @@ fn alone(bodies: &[RawModel], body: usize) -> RawModel {
 fn assert_same(a: &FlexBody, b: &FlexBody) {
     let (mut a, mut b) = (a.clone().into_parts(), b.clone().into_parts());
     for parts in [&mut a, &mut b] {
-        parts.source.number = None;
-        parts.source.name.clear();
+        parts.description.number = None;
+        parts.description.name.clear();
         parts.source.files.clear();
     }
     assert!(a == b, "frequencies {:?} and {:?}", a.modes.eigenvalue, b.modes.eigenvalue);
@@ -118,13 +117,13 @@ fn two_cubes_dealt_out_in_turn_are_converted_as_each_alone() {
     assert_eq!(split.len(), 2);
     for (b, checked) in split.iter().enumerate() {
         assert_eq!(checked.model.number(), Some(BodyNumber { number: b + 1, of: 2 }));
-        assert_eq!(checked.model.name(), format!("{}-{}", bodies[0].name, b + 1));
+        assert_eq!(checked.model.name(), format!("{}-{}", bodies[0].data.description.name, b + 1));
         let own = FeModel::from_raw(alone(&bodies, b)).unwrap().model;
         assert_eq!(checked.model.stiffness(), own.stiffness());
         assert_eq!(checked.model.scalar_mass(), own.scalar_mass());
         let found = convert(&checked.model, &settings, &Context::QUIET).unwrap().body;
         assert_same(&found, &convert(&own, &settings, &Context::QUIET).unwrap().body);
-        assert_eq!(found.source().number, checked.model.number());
+        assert_eq!(found.description().number, checked.model.number());
     }
 }
 
@@ -152,7 +151,7 @@ fn a_damping_matrix_is_taken_apart_too_and_must_not_couple_bodies() {
         RawMatrix { matrix: CscMatrix::from_triplets(n, n, &all), ..matrix.clone() }
     };
     let with_damping = |mut raw: RawModel| {
-        raw.damping = Some(Damping::Matrix(scaled(&raw.stiffness)));
+        raw.data.damping = Some(Damping::Matrix(scaled(&raw.stiffness)));
         raw
     };
     let bodies = [block(2), block(3)];
@@ -161,7 +160,7 @@ fn a_damping_matrix_is_taken_apart_too_and_must_not_couple_bodies() {
         let own = FeModel::from_raw(with_damping(alone(&bodies, b))).unwrap().model;
         assert_eq!(checked.model.damping(), own.damping());
     }
-    let Some(Damping::Matrix(d)) = &mut whole.damping else { unreachable!("just made") };
+    let Some(Damping::Matrix(d)) = &mut whole.data.damping else { unreachable!("just made") };
     let mut all: Vec<_> = entries(&d.matrix).collect();
     all.extend([(0, 1, -1.0), (1, 0, -1.0)]);
     let n = d.matrix.n_cols();
@@ -174,8 +173,8 @@ fn a_damping_matrix_is_taken_apart_too_and_must_not_couple_bodies() {
 fn block(cells: i32) -> RawModel {
     let mesh = Mesh::block(ElementKind::Hex8, [cells, 2, 1], [0.1 * f64::from(cells), 0.15, 0.07]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.name = "pair".to_owned();
-    raw.interfaces = vec![NodeSet::new("root", raw.nodes.ids[..3].to_vec())];
+    raw.data.description.name = "pair".to_owned();
+    raw.data.interfaces = vec![NodeSet::new("root", raw.nodes.ids[..3].to_vec())];
     raw
 }
 
@@ -191,7 +190,7 @@ fn files(raw: &RawModel) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let manifest = write_model(folder.path(), raw, Triangle::Lower);
     let mut text = std::fs::read_to_string(&manifest).unwrap();
-    for set in &raw.interfaces {
+    for set in &raw.data.interfaces {
         text.push_str(&format!("[[interface]]\nname = \"{}\"\nnodes = {:?}\n", set.name, set.nodes));
     }
     std::fs::write(manifest, text).unwrap();
@@ -226,8 +225,8 @@ fn every_body_gets_files_of_its_own() {
     for (b, raw) in bodies.iter().enumerate() {
         let name = format!("pair-{}.flex.h5", b + 1);
         let body = flexbody_file::read(folder.path().join(&name)).unwrap();
-        assert_eq!(body.source().name, format!("pair-{}", b + 1));
-        assert_eq!(body.source().number, Some(BodyNumber { number: b + 1, of: 2 }));
+        assert_eq!(body.description().name, format!("pair-{}", b + 1));
+        assert_eq!(body.description().number, Some(BodyNumber { number: b + 1, of: 2 }));
         let sets: Vec<_> = body.interfaces().iter().map(|i| (i.name.clone(), i.nodes.clone())).collect();
         assert_eq!(sets, [(format!("root{b}"), vec![0, 1, 2])]);
         let own = files(&alone(&bodies, b));
@@ -283,7 +282,10 @@ fn a_single_body_is_number_one_of_one_and_numbered_outputs_do_not_hit_inputs() {
     let folder = files(&block(2));
     let run = flexbody(folder.path(), "convert model.toml -o b.h5 --split --modes 2 --quiet");
     assert_eq!(run.status.code(), Some(0));
-    assert_eq!(flexbody_file::read(folder.path().join("b-1.h5")).unwrap().source().number.unwrap().of, 1);
+    assert_eq!(
+        flexbody_file::read(folder.path().join("b-1.h5")).unwrap().description().number.unwrap().of,
+        1
+    );
 
     let folder = files(&interleaved(&[block(2), block(3)]));
     std::fs::rename(folder.path().join("K.mtx"), folder.path().join("b-2.h5")).unwrap();

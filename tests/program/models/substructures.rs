@@ -34,8 +34,8 @@ fn a_substructure_of_abaqus_is_the_superelement_of_nastran() {
     let raw = job(&small(FOLDER), vec![set("left", "LEFT")]);
     let codes: Vec<Code> = raw.diagnostics.iter().map(|diagnostic| diagnostic.code()).collect();
     assert_eq!(codes, [Code::JobCondensed]);
-    assert_eq!(raw.interfaces[0].nodes, [11, 14, 17, 20]);
-    let names: Vec<&str> = raw.sources.iter().map(|source| source.name.as_str()).collect();
+    assert_eq!(raw.data.interfaces[0].nodes, [11, 14, 17, 20]);
+    let names: Vec<&str> = raw.data.sources.iter().map(|source| source.name.as_str()).collect();
     assert_eq!(names, ["job.inp", "ends.mtx"]);
     assert_eq!(raw.stiffness.digits, 14);
     let punched = job(&small("nastran_superelement").with_file_name("job.pch"), Vec::new());

@@ -40,7 +40,7 @@ fn with_ends(straight: &Mesh, mut raw: RawModel) -> RawModel {
         let kept = straight.nodes.iter().enumerate().filter(|(_, node)| (node[0] - x).abs() < 1e-9);
         kept.map(|(i, _)| i as i64 + 1).collect()
     };
-    raw.interfaces = [("root", 0.0), ("tip", LENGTH)]
+    raw.data.interfaces = [("root", 0.0), ("tip", LENGTH)]
         .map(|(name, x)| NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new(name, end(x)) })
         .to_vec();
     raw
@@ -79,7 +79,7 @@ fn hanging(carried: &FlexBody, gravity: Vector3<f64>) -> DVector<f64> {
 #[test]
 fn with_all_modes_the_carried_body_is_the_clamped_model() {
     let raw = turned_bar();
-    let clamped = HeldModel::new(&raw, &raw.interfaces[0].nodes);
+    let clamped = HeldModel::new(&raw, &raw.data.interfaces[0].nodes);
     let body = body_of(raw.clone(), ALL, BodyFrame::Principal);
     assert_eq!(body.n_modes(), ALL);
     let carried = body.carried(&root()).expect("an interface");
@@ -133,7 +133,7 @@ fn carried_invariants_are_those_of_the_mass_matrix() {
 fn carried_frames_of_beams_keep_what_is_linear_in_the_modes() {
     let folder = fixtures().join("models/car_frame");
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("a manifest")).expect("a model");
-    let name = raw.interfaces[0].name.clone();
+    let name = raw.data.interfaces[0].name.clone();
     let model = FeModel::from_raw(raw).expect("a body").model;
     let body = fixture("car_frame", 8, BodyFrame::Principal);
     assert!(body.invariants().general().is_some());
@@ -159,7 +159,7 @@ fn run(body: &FlexBody, text: &str) -> (Recording, Vec<Diagnostic>) {
 #[ignore = "slow"]
 fn a_cantilever_bends_under_gravity_and_its_root_carries_the_weight() {
     let raw = turned_bar();
-    let clamped = HeldModel::new(&raw, &raw.interfaces[0].nodes);
+    let clamped = HeldModel::new(&raw, &raw.data.interfaces[0].nodes);
     let body = body_of(raw.clone(), ALL, BodyFrame::Principal);
     let (recording, said) = run(
         &body,
@@ -373,7 +373,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
 
     let manifest = read_manifest(place.join("model.toml")).expect("a manifest");
     let raw = read_model(&manifest).expect("a model");
-    let base = raw.interfaces.iter().find(|set| set.name == "bolt_base").expect("an interface");
+    let base = raw.data.interfaces.iter().find(|set| set.name == "bolt_base").expect("an interface");
     let (ids, u) = clamped_static(place, Vector3::new(0.0, 0.0, -9810.0), &base.nodes);
     let at = ids.iter().position(|id| *id == 20000).expect("a node");
     let expected = Vector3::new(u[3 * at], u[3 * at + 1], u[3 * at + 2]);

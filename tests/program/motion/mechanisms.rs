@@ -61,7 +61,7 @@ enum Seat {
 /// Returns a body of the fixtures with joints at the means of its interfaces, like those of the record.
 fn placed(one: &Placed) -> FlexBody {
     let mut raw = raw_fixture(&one.model);
-    for set in &mut raw.interfaces {
+    for set in &mut raw.data.interfaces {
         let index = |id: &i64| raw.nodes.ids.iter().position(|own| own == id).expect("a node");
         let places = set.nodes.iter().map(|id| Vector3::from(raw.nodes.positions[index(id)]));
         set.reference = Reference::Point((places.sum::<Vector3<f64>>() / set.nodes.len() as f64).into());
@@ -181,7 +181,7 @@ fn bar(youngs: f64) -> FlexBody {
     };
     let material = Material { youngs, poisson: 0.3, density: 1000.0 };
     let mut raw = mesh.assemble(&material, MassRule::Consistent).raw_model();
-    raw.interfaces = vec![end("left", -0.5 * LENGTH), end("right", 0.5 * LENGTH)];
+    raw.data.interfaces = vec![end("left", -0.5 * LENGTH), end("right", 0.5 * LENGTH)];
     body_of(raw, 4, BodyFrame::Com)
 }
 

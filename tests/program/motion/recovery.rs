@@ -25,9 +25,9 @@ fn folder() -> (TempDir, RawModel) {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = mesh();
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.recoveries = vec![mesh.stresses(&Material::STEEL)];
+    raw.data.recoveries = vec![mesh.stresses(&Material::STEEL)];
     write_model(folder.path(), &raw, Triangle::Lower);
-    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.data.recoveries[0].operator else {
         panic!("rows")
     };
     let mut operator = format!(
@@ -203,7 +203,7 @@ fn runs_and_names_that_do_not_fit_are_refused() {
 fn every_format_of_the_operator_gives_the_same_rows() {
     let (folder, raw) = folder();
     let place = folder.path();
-    let RecoveryOperator::Rows { transposed, .. } = &raw.recoveries[0].operator else { panic!("rows") };
+    let RecoveryOperator::Rows { transposed, .. } = &raw.data.recoveries[0].operator else { panic!("rows") };
     let (rows, columns) = (transposed.n_cols(), transposed.n_rows());
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     let mut head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");

@@ -24,9 +24,9 @@ fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let (place, mesh) = (folder.path(), mesh());
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.recoveries = vec![mesh.stresses(&Material::STEEL)];
+    raw.data.recoveries = vec![mesh.stresses(&Material::STEEL)];
     write_model(place, &raw, Triangle::Lower);
-    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.data.recoveries[0].operator else {
         panic!("rows")
     };
     let (rows, columns) = (transposed.n_cols(), transposed.n_rows());

@@ -122,7 +122,7 @@ impl Reference {
     /// Returns the unit load without the inertia forces that balance it.
     fn load(&self, raw: &RawModel, kind: &LoadKind, component: usize) -> DVector<f64> {
         let at = |name: &String, column: usize| {
-            let set = raw.interfaces.iter().find(|set| set.name == *name).expect("an interface");
+            let set = raw.data.interfaces.iter().find(|set| set.name == *name).expect("an interface");
             let reference = Vector3::from(set.reference.point().expect("a point"));
             let is_member = |row: usize| set.nodes.contains(&self.ids[row / 3]);
             let mut own = self.rigid(reference);
@@ -171,9 +171,9 @@ fn stress_stiffness_of_calculix_is_that_of_element_code() {
         let raw =
             read_model(&read_manifest(place.join("stressed.toml")).expect("a manifest")).expect("a model");
         let reference = Reference::new(place, &raw);
-        let kinds: Vec<&str> = raw.geometric_stiffness.iter().map(|one| one.load.kind.name()).collect();
+        let kinds: Vec<&str> = raw.data.geometric_stiffness.iter().map(|one| one.load.kind.name()).collect();
         assert_eq!(kinds, ["spin", "force", "moment"]);
-        for one in &raw.geometric_stiffness {
+        for one in &raw.data.geometric_stiffness {
             let load = reference.load(&raw, &one.load.kind, one.load.component);
             let expected = reference.stress_stiffness(&load);
             let error = (reference.by_nodes(&one.matrix.matrix) - &expected).amax() / expected.amax();

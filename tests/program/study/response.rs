@@ -37,9 +37,9 @@ fn damped_block(damping: Option<Damping<RawMatrix>>) -> FeModel {
     };
     for (name, x) in [("left", 0.0), ("right", 0.4)] {
         let nodes = end(&raw, x);
-        raw.interfaces.push(NodeSet::new(name, nodes));
+        raw.data.interfaces.push(NodeSet::new(name, nodes));
     }
-    raw.damping = damping;
+    raw.data.damping = damping;
     FeModel::from_raw(raw).expect("a model").model
 }
 
@@ -171,7 +171,7 @@ fn a_chain_of_rods_has_its_closed_form() {
     for (name, x) in [("left", 0.0), ("right", length)] {
         let at = |(_, position): &(&i64, &[f64; 3])| (position[0] - x).abs() < 1e-9;
         let nodes = raw.nodes.ids.iter().zip(&positions).filter(at).map(|(&id, _)| id).collect();
-        raw.interfaces.push(NodeSet::new(name, nodes));
+        raw.data.interfaces.push(NodeSet::new(name, nodes));
     }
     let model = FeModel::from_raw(raw).expect("a model").model;
     let body = free(&model, 30);
@@ -406,7 +406,7 @@ fn coupled_block(coupling: Coupling) -> RawModel {
     for (name, x) in [("left", 0.0), ("right", 0.4)] {
         let nodes = raw.nodes.positions.iter().zip(&raw.nodes.ids);
         let nodes = nodes.filter(|(position, _)| (position[0] - x).abs() < 1e-9).map(|(_, &id)| id).collect();
-        raw.interfaces.push(NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes) });
+        raw.data.interfaces.push(NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes) });
     }
     raw
 }
@@ -417,12 +417,12 @@ fn motions_under_coupling(raw: &RawModel) -> DMatrix<f64> {
     let n = 3 * raw.nodes.ids.len();
     let mut columns: Vec<DVector<f64>> = Vec::new();
     let index = |id: &i64| raw.nodes.ids.iter().position(|own| own == id).expect("a node");
-    let held: Vec<usize> = raw.interfaces.iter().flat_map(|set| set.nodes.iter().map(index)).collect();
+    let held: Vec<usize> = raw.data.interfaces.iter().flat_map(|set| set.nodes.iter().map(index)).collect();
     for node in (0..raw.nodes.ids.len()).filter(|node| !held.contains(node)) {
         columns
             .extend((0..3).map(|k| DVector::from_fn(n, |row, _| f64::from(u8::from(row == 3 * node + k)))));
     }
-    for set in &raw.interfaces {
+    for set in &raw.data.interfaces {
         let places: Vec<usize> = set.nodes.iter().map(index).collect();
         let position = |node: usize| Vector3::from(raw.nodes.positions[node]);
         let mean = places.iter().map(|&node| position(node)).sum::<Vector3<f64>>() / places.len() as f64;

@@ -8,7 +8,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::context::Context;
-use flexbody_model::{Damping, FeModel, RawModel};
+use flexbody_model::{Damping, FeModel};
 use flexbody_motion::integration::free_oscillation;
 use flexbody_motion::scene::{LoadCases, Scene, simulate};
 use flexbody_study::tailoring::Tailoring;
@@ -148,7 +148,7 @@ fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     let mut settings = ConvertSettings { lumped: Vec::new(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(8);
     let lacks = |damping: Option<Damping<_>>| -> Vec<f64> {
-        let model = FeModel::from_raw(RawModel { damping, ..raw.clone() }).expect("sound").model;
+        let model = FeModel::from_raw(raw.clone().with(|data| data.damping = damping)).expect("sound").model;
         let tailoring = Tailoring { settings: settings.clone(), by_band: false, of_motion: false };
         let made = tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
         made.rounds[0].iter().map(|round| round.worst).collect()

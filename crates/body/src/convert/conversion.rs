@@ -99,9 +99,9 @@ impl ModalModel<'_> {
     ) -> Result<(Parts, Option<Diagnostic>)> {
         let (modes, overdamped) = self.damped_modes(&condensed.invariants)?;
         let parts = Parts {
+            description: self.model.description().clone(),
             source: self.source(),
             dimension: self.model.dimension(),
-            units: self.model.units().clone(),
             frame: self.place.frame,
             conditions: match &self.settings.frame {
                 FrameChoice::Interface(name) => ReferenceConditions::Interface(name.clone()),
@@ -130,9 +130,7 @@ impl ModalModel<'_> {
     fn source(&self) -> Source {
         let (model, settings) = (self.model, self.settings);
         Source {
-            name: model.name().to_owned(),
             files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
-            number: model.number(),
             n_dofs: model.stiffness().n(),
             mass_structure: match model.scalar_mass() {
                 None => MassStructure::General,

@@ -15,7 +15,9 @@ use faer::Mat;
 use flexbody_base::error::{Error, Result};
 use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
-use flexbody_model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, span};
+use flexbody_model::{
+    Coupling, Description, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, span,
+};
 
 /// Flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,6 +116,11 @@ impl FlexBody {
         self.parts.dimension
     }
 
+    /// Returns the name of the model and the units of all numbers.
+    pub fn description(&self) -> &Description {
+        &self.parts.description
+    }
+
     /// Returns the provenance.
     pub fn source(&self) -> &Source {
         &self.parts.source
@@ -121,7 +128,7 @@ impl FlexBody {
 
     /// Returns the units of all numbers.
     pub fn units(&self) -> &UnitSystem {
-        &self.parts.units
+        &self.parts.description.units
     }
 
     /// Returns the body frame in model coordinates.
@@ -185,7 +192,7 @@ impl FlexBody {
 
     /// Returns f_j = sqrt(lambda_j) / (2 pi) in hertz (nf), independent of the body's unit of time.
     pub fn frequencies_hz(&self) -> Vec<f64> {
-        let hertz = self.parts.units.hertz();
+        let hertz = self.parts.description.units.hertz();
         self.parts.modes.eigenvalue.iter().map(|l| l.sqrt() / std::f64::consts::TAU * hertz).collect()
     }
 

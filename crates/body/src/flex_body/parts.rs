@@ -5,18 +5,13 @@ use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 use crate::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
 use faer::Mat;
 use flexbody_base::provenance::SourceFile;
-use flexbody_base::units::UnitSystem;
-use flexbody_model::{BodyNumber, GeometricStiffness, Nodes, SurfaceMesh};
+use flexbody_model::{Description, GeometricStiffness, Nodes, SurfaceMesh};
 
 /// Provenance of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
-    /// Model name.
-    pub name: String,
     /// Files and fingerprints.
     pub files: Vec<SourceFile>,
-    /// Number of this body if the matrices held several bodies and were split.
-    pub number: Option<BodyNumber>,
     /// Number of matrix rows of the FE model; 0 if unknown, and then the nodes may be a subset of the
     /// model's nodes.
     pub n_dofs: usize,
@@ -168,12 +163,12 @@ pub struct LumpedBody {
 /// [`FlexBody::new`](super::FlexBody::new) states the conditions that the parts must fulfil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parts {
+    /// Name of the model and units of all numbers.
+    pub description: Description,
     /// Provenance.
     pub source: Source,
     /// Dimension: 3, or 2 for a body that moves in its plane z = 0 only.
     pub dimension: usize,
-    /// Units of all numbers.
-    pub units: UnitSystem,
     /// Body frame.
     pub frame: Frame,
     /// Reference conditions that tie the body frame to the deformed body.

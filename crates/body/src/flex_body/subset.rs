@@ -58,9 +58,9 @@ impl FlexBody {
         };
         let before = parts.terms.iter().filter(|old| terms.iter().all(|new| new.group != old.group));
         let body = Self::new(Parts {
+            description: parts.description.clone(),
             source: parts.source.clone(),
             dimension: parts.dimension,
-            units: parts.units.clone(),
             frame: parts.frame,
             conditions: parts.conditions.clone(),
             nodes: parts.nodes.clone(),

@@ -25,11 +25,9 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.nodes(parts);
     check.mesh(parts, n);
     check.modes(parts, n, nf);
-    if !(parts.units.hertz().is_finite() && parts.units.hertz() * MAX_NUMBER.sqrt() <= MAX_NUMBER) {
-        check.add(format!(
-            "`units.time` is {} s, too short for frequencies in hertz",
-            parts.units.time.name()
-        ));
+    let (hertz, time) = (parts.description.units.hertz(), &parts.description.units.time);
+    if !(hertz.is_finite() && hertz * MAX_NUMBER.sqrt() <= MAX_NUMBER) {
+        check.add(format!("`units.time` is {} s, too short for frequencies in hertz", time.name()));
     }
     check.extend(parts.invariants.problems("invariants", nf));
     if parts.invariants.mass().is_finite() && parts.invariants.mass() <= 0.0 {
@@ -53,8 +51,10 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.coordinates(parts, nf);
     check.recoveries(parts, nf);
     check.named_loads(parts, nf);
-    check.text("source.name", &parts.source.name);
-    if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
+    for (field, text) in parts.description.texts() {
+        check.text(&format!("source.{field}"), text);
+    }
+    if let Some(number) = parts.description.number.filter(|n| n.number == 0 || n.number > n.of) {
         check.add(format!("`source.number` is {number}"));
     }
     check.text("certificate.remark", &c.remark);

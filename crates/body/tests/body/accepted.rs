@@ -163,7 +163,7 @@ proptest! {
         let mut raw = with_random_inertia(&raw_fixture("frame_beams"), seed, &sizes);
         let ids = &raw.nodes.ids;
         let ends = [("first", ids[0]), ("last", ids[ids.len() - 1])];
-        raw.interfaces = ends
+        raw.data.interfaces = ends
             .map(|(name, node)| NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new(name, vec![node]) })
             .into();
         let model = FeModel::from_raw(raw).expect("a body").model;
@@ -182,7 +182,7 @@ proptest! {
 fn a_body_that_breaks_an_identity_is_refused() {
     let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);
     let mut raw = mesh.assemble(&UNIT, MassRule::Consistent).raw_model();
-    raw.damping = Some(Damping::Ratio(0.02));
+    raw.data.damping = Some(Damping::Ratio(0.02));
     let model = FeModel::from_raw(raw).expect("a body").model;
     let mut settings = ConvertSettings::default();
     settings.modes.wanted = Wanted::Lowest(6);

@@ -36,8 +36,8 @@ fn bracket(recovery: ModelRecovery) -> RawModel {
         coupling: Some(Coupling::Averaging),
         ..NodeSet::new(name, end(axis))
     };
-    raw.interfaces = [("first", 0), ("second", 2)].map(set).to_vec();
-    raw.recoveries = vec![recovery];
+    raw.data.interfaces = [("first", 0), ("second", 2)].map(set).to_vec();
+    raw.data.recoveries = vec![recovery];
     raw
 }
 

@@ -62,12 +62,13 @@ impl Dense {
         // Nodes whose displacements an interface prescribes do not contribute to the mean of another
         // interface.
         let prescribed: HashSet<i64> = raw
+            .data
             .interfaces
             .iter()
             .filter(|set| set.coupling != Some(Coupling::Averaging))
             .flat_map(|set| set.nodes.iter().copied())
             .collect();
-        for set in &raw.interfaces {
+        for set in &raw.data.interfaces {
             let nodes: Vec<usize> = set.nodes.iter().map(|id| (*id - 1) as usize).collect();
             let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |c| d * i + c)).collect();
             let column = |values: &dyn Fn(usize) -> f64| {
@@ -198,7 +199,7 @@ fn modal_responses(basis: &ModalBasis, forces: MatRef<'_, f64>) -> Mat<f64> {
 #[test]
 fn fixed_interface_modes_are_those_of_the_held_body() {
     for raw in models() {
-        let (what, oracle) = (format!("{:?}", raw.interfaces), Dense::new(&raw));
+        let (what, oracle) = (format!("{:?}", raw.data.interfaces), Dense::new(&raw));
         let expected = oracle.eigenvalues(oracle.held.as_ref(), 0);
         let model = model(raw);
         for (method, factor) in [
@@ -223,7 +224,7 @@ fn fixed_interface_modes_are_those_of_the_held_body() {
 fn static_responses_to_interface_loads_are_exact() {
     for raw in models() {
         let (what, oracle, d) =
-            (format!("{:?}", raw.interfaces), Dense::new(&raw), usize::from(raw.dimension));
+            (format!("{:?}", raw.data.interfaces), Dense::new(&raw), usize::from(raw.dimension));
         let loads = oracle.equilibrated();
         assert_eq!(loads.ncols(), oracle.weights.ncols() - if d == 2 { 3 } else { 6 });
         let forces = &oracle.weights * &loads;
@@ -241,7 +242,7 @@ fn static_responses_to_interface_loads_are_exact() {
 #[ignore = "slow"]
 fn free_frequencies_come_from_above_to_those_of_the_body() {
     for raw in models() {
-        let (what, oracle) = (format!("{:?}", raw.interfaces), Dense::new(&raw));
+        let (what, oracle) = (format!("{:?}", raw.data.interfaces), Dense::new(&raw));
         let zero = if raw.dimension == 2 { 3 } else { 6 };
         let exact = oracle.eigenvalues(oracle.allowed().as_ref(), zero);
         let model = model(raw);
@@ -271,7 +272,7 @@ fn free_frequencies_come_from_above_to_those_of_the_body() {
 fn rows_of_the_interfaces_are_the_motion_of_the_reference_points() {
     for raw in models() {
         let (oracle, d) = (Dense::new(&raw), usize::from(raw.dimension));
-        let couplings: Vec<_> = raw.interfaces.iter().map(|set| set.coupling.expect("stated")).collect();
+        let couplings: Vec<_> = raw.data.interfaces.iter().map(|set| set.coupling.expect("stated")).collect();
         let model = model(raw);
         let body = body(&model, 6);
         let axes = body.frame().axes;
@@ -378,7 +379,7 @@ fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
     let end = |at: f64| (0..x.len()).filter(|&i| (x[i][0] - at).abs() < 1e-9).map(|i| i as i64 + 1).collect();
     let ends: [Vec<i64>; 2] = [end(0.0), end(3.0)];
     for coupling in [Coupling::Rigid, Coupling::Averaging, Coupling::Free] {
-        raw.interfaces = ["first", "second"]
+        raw.data.interfaces = ["first", "second"]
             .into_iter()
             .zip(&ends)
             .map(|(name, nodes)| NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes.clone()) })
@@ -410,7 +411,7 @@ fn motions_without_mass_are_left_out_and_told() {
         (0..raw.nodes.len()).filter(near).map(|i| raw.nodes.ids[i]).collect::<Vec<_>>()
     };
     let free = |name: &str, nodes| NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new(name, nodes) };
-    raw.interfaces = vec![free("low", end(low)), free("high", end(high))];
+    raw.data.interfaces = vec![free("low", end(low)), free("high", end(high))];
     let done = converted(&model(raw), BasisChoice::CraigBampton(CraigBampton), 8, BodyFrame::Principal);
     let told = done.diagnostics.iter().find(|d| d.code() == Code::ShapesDependent).expect("told");
     assert!(told.message().contains("move no mass"), "{}", told.message());
@@ -435,8 +436,8 @@ fn the_span_does_not_depend_on_the_reference_points() {
     for couplings in &COUPLINGS[..3] {
         let near = craig_bampton(&model(bracket(*couplings)), 5).solution;
         let mut raw = bracket(*couplings);
-        raw.interfaces[0].reference = Reference::Node(raw.nodes.ids[0]);
-        raw.interfaces[1].reference = Reference::Centre;
+        raw.data.interfaces[0].reference = Reference::Node(raw.nodes.ids[0]);
+        raw.data.interfaces[1].reference = Reference::Centre;
         let far = craig_bampton(&model(raw), 5).solution;
         for (a, b) in near.eigenvalues.iter().zip(&far.eigenvalues) {
             close(*a, *b, 1e-10, "lambda");
@@ -449,7 +450,7 @@ fn the_span_does_not_depend_on_the_reference_points() {
 fn averaging_is_the_default() {
     let stated = bracket([Coupling::Averaging, Coupling::Averaging]);
     let mut raw = stated.clone();
-    raw.interfaces.iter_mut().for_each(|set| set.coupling = None);
+    raw.data.interfaces.iter_mut().for_each(|set| set.coupling = None);
     let body = body(&model(raw), 4);
     let expected = craig_bampton(&model(stated), 4).solution.eigenvalues;
     assert_eq!(body.modes().eigenvalue, expected);
@@ -459,7 +460,7 @@ fn averaging_is_the_default() {
 #[test]
 fn one_interface_gives_fixed_interface_modes_alone() {
     let mut raw = bracket([Coupling::Rigid, Coupling::Rigid]);
-    raw.interfaces.pop();
+    raw.data.interfaces.pop();
     let basis = craig_bampton(&model(raw), 5);
     assert_eq!(basis.solution.eigenvalues.len(), 5);
     let provenance = &basis.provenance;
@@ -472,7 +473,7 @@ fn one_interface_gives_fixed_interface_modes_alone() {
 #[test]
 fn attachment_modes_carry_the_loads_of_the_interfaces() {
     for raw in models() {
-        let (what, oracle) = (format!("{:?}", raw.interfaces), Dense::new(&raw));
+        let (what, oracle) = (format!("{:?}", raw.data.interfaces), Dense::new(&raw));
         let model = model(raw);
         let basis = modes_of(&model, &CraigChang::default(), &lowest(6)).expect("a basis");
         let count = basis.provenance.iter().filter(|p| *p == "free mode").count();
@@ -529,15 +530,15 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
     assert!(short_of_memory(rigid, 100_000), "the constraint modes");
     let mut raw = sound();
     let all = raw.nodes.ids.clone();
-    raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new("all", all) }];
+    raw.data.interfaces = vec![NodeSet { coupling: Some(Coupling::Free), ..NodeSet::new("all", all) }];
     assert!(refused(raw, &lowest(5)).has(Code::InterfaceCoupling));
     let mut raw = sound();
-    raw.interfaces[0].nodes.truncate(2);
-    raw.interfaces[0].coupling = Some(Coupling::Free);
-    raw.interfaces.pop();
+    raw.data.interfaces[0].nodes.truncate(2);
+    raw.data.interfaces[0].coupling = Some(Coupling::Free);
+    raw.data.interfaces.pop();
     assert!(refused(raw, &lowest(5)).has(Code::InterfaceCoupling), "two nodes hold nothing");
     let mut raw = bracket([Coupling::Rigid, Coupling::Averaging]);
-    raw.interfaces.pop();
+    raw.data.interfaces.pop();
     let below = ModeSettings { wanted: Wanted::Below(1.0), ..ModeSettings::default() };
     assert!(refused(raw, &below).has(Code::ShapesNone), "nothing but rigid motion");
 }
@@ -555,7 +556,7 @@ fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
         for ends in [vec![face(0.0)], vec![face(0.0), face(4.0)]] {
             let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
             let sets = ends.into_iter().enumerate();
-            raw.interfaces = sets.map(|(i, nodes)| NodeSet::new(format!("end {i}"), nodes)).collect();
+            raw.data.interfaces = sets.map(|(i, nodes)| NodeSet::new(format!("end {i}"), nodes)).collect();
             let settings = ModeSettings { method, ..lowest(3) };
             let error = modes_of(&model(raw), &CraigBampton, &settings).expect_err("a mechanism");
             assert!(error.has(Code::Mechanism), "{error}");

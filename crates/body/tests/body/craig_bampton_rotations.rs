@@ -31,7 +31,7 @@ fn with(mut raw: RawModel, coupling: Coupling, sets: &[Vec<i64>]) -> FeModel {
         coupling: Some(coupling),
         ..NodeSet::new(format!("joint {i}"), nodes.clone())
     };
-    raw.interfaces = sets.iter().enumerate().map(set).collect();
+    raw.data.interfaces = sets.iter().enumerate().map(set).collect();
     FeModel::from_raw(raw).expect("a sound model").model
 }
 
@@ -144,7 +144,7 @@ fn rigid_interfaces_tie_rotations() {
     };
     assert!(edge.len() > 2);
     for (raw, nodes) in [(mpc, reference), (shell, edge)] {
-        let what = raw.name.clone();
+        let what = raw.data.description.name.clone();
         let model = with(raw, Coupling::Rigid, std::slice::from_ref(&nodes));
         let body = body(&model, 8);
         let held = |row: usize| nodes.contains(&model.label(row).node);

@@ -30,7 +30,7 @@ fn read(path: &Path, interfaces: Vec<InterfaceSource>) -> Result<RawModel, Error
 
 fn nodes(path: &Path, name: &str) -> Vec<i64> {
     let mut raw = read(path, vec![set("a", name)]).unwrap_or_else(|error| panic!("{name}: {error}"));
-    raw.interfaces.remove(0).nodes
+    raw.data.interfaces.remove(0).nodes
 }
 
 /// Without instances a dot belongs to the name of a set; blanks are ignored.
@@ -39,7 +39,7 @@ fn sets_of_a_deck_without_instances_may_have_dots() {
     let sets = "*NSET, NSET=TIP.1\n5, 35\n*NSET, NSET=A.1\nTIP.1, 75\n*NSET,NSET=A B\na.1\n*MATERIAL";
     let (_folder, path) = changed("calculix_shells", |text| text.replace("*MATERIAL", sets));
     let raw = read(&path, vec![set("tip", "tip.1"), set("all", "A.1"), set("blank", "AB")]).expect("read");
-    let of = |at: usize| raw.interfaces[at].nodes.clone();
+    let of = |at: usize| raw.data.interfaces[at].nodes.clone();
     // A set on a line takes the nodes on both faces: two of each, and of 75, which has no row of its own.
     assert_eq!((&of(0)[..2], of(0).len()), (&[5, 35][..], 6));
     assert_eq!((&of(1)[..6], of(1).len()), (&of(0)[..], 8));
@@ -121,7 +121,7 @@ fn blanks_in_keywords_do_not_count() {
             text.replace(section, to)
         });
         let raw = job(&path, vec![set("left", "LEFT")]);
-        let positions: Vec<f64> = raw.interfaces[0]
+        let positions: Vec<f64> = raw.data.interfaces[0]
             .nodes
             .iter()
             .map(|node| {
@@ -187,8 +187,11 @@ fn included_files_and_files_of_data_lie_where_the_job_is() {
     fs::write(&path, text).expect("written");
     let (raw, expected) =
         (job(&path, vec![set("l", "Left")]), job(&oracle::jobs::small("abaqus_labels"), Vec::new()));
-    assert_eq!((&raw.nodes, &raw.dofs, raw.interfaces[0].nodes.len()), (&expected.nodes, &expected.dofs, 4));
-    let names: Vec<&str> = raw.sources.iter().map(|source| source.name.as_str()).collect();
+    assert_eq!(
+        (&raw.nodes, &raw.dofs, raw.data.interfaces[0].nodes.len()),
+        (&expected.nodes, &expected.dofs, 4)
+    );
+    let names: Vec<&str> = raw.data.sources.iter().map(|source| source.name.as_str()).collect();
     assert_eq!(names[..3], ["job.inp", "n.txt", "e.txt"]);
     fs::remove_file(folder.path().join("e.txt")).expect("removed");
     let error = read(&path, Vec::new()).expect_err("no elements");

@@ -91,7 +91,7 @@ fn empty_rows_are_left_out_and_told() {
 #[test]
 fn what_is_said_of_left_out_rows_is_refused() {
     let mut raw = block_with_empty_rows();
-    raw.interfaces = vec![NodeSet::new("hook", vec![9001])];
+    raw.data.interfaces = vec![NodeSet::new("hook", vec![9001])];
     let error = FeModel::from_raw(raw).expect_err("an interface of a node that is not there");
     assert!(error.to_string().contains("names 1 nodes without stiffness and mass: 9001"), "{error}");
 

@@ -31,7 +31,7 @@ fn with_root(raw: RawModel, coupling: Coupling) -> FeModel {
     let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 1e-9);
     let root = NodeSet::new("root", nodes.map(|(id, _)| *id).collect());
     let interfaces = vec![NodeSet { coupling: Some(coupling), ..root }];
-    FeModel::from_raw(RawModel { interfaces, ..raw }).expect("a sound model").model
+    FeModel::from_raw(raw.with(|data| data.interfaces = interfaces)).expect("a sound model").model
 }
 
 fn root() -> Carrier {

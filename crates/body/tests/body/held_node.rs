@@ -7,7 +7,7 @@ use flexbody_body::flex_body::{Carrier, FlexBody};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
-use flexbody_model::{FeModel, NodeSet, RawModel, Reference};
+use flexbody_model::{FeModel, NodeSet, Reference};
 use oracle::beams::{BeamMass, star};
 
 const FOOT: &str = "foot";
@@ -19,7 +19,7 @@ fn body(frame: FrameChoice) -> FlexBody {
         reference: Reference::Point([0.1, -0.2, 0.05]),
         ..NodeSet::new(FOOT, vec![raw.nodes.ids[1]])
     };
-    let model = FeModel::from_raw(RawModel { interfaces: vec![foot], ..raw }).expect("a body").model;
+    let model = FeModel::from_raw(raw.with(|data| data.interfaces = vec![foot])).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(36), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, frame, ..ConvertSettings::default() };
     convert(&model, &settings, &Context::QUIET).expect("converts").body

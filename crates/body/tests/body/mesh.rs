@@ -66,7 +66,7 @@ fn decks_give_the_surface_of_their_solids() {
     let [a, b, c]: [f64; 3] = [0.2, 0.08, 0.06];
     for name in ["calculix", "abaqus", "abaqus_labels"] {
         let raw = job(name);
-        let mesh = raw.mesh.as_ref().expect("a surface");
+        let mesh = raw.data.mesh.as_ref().expect("a surface");
         assert_encloses(mesh, &raw.nodes, a * b * c, 2.0 * (a * b + b * c + c * a));
         assert_eq!((mesh.triangles().len(), mesh.edges().len()), (20, 16), "{name}");
     }
@@ -82,7 +82,7 @@ fn decks_of_nastran_give_the_surface_of_their_solids() {
     )
     .expect("a job");
     for raw in [job, read(&deck("nastran_op4"))] {
-        let mesh = raw.mesh.as_ref().expect("a surface");
+        let mesh = raw.data.mesh.as_ref().expect("a surface");
         assert_encloses(mesh, &raw.nodes, a * b * c, 2.0 * (a * b + b * c + c * a));
         assert_eq!((mesh.triangles().len(), mesh.edges().len()), (20, 16));
     }
@@ -129,7 +129,7 @@ fn elements_of_nastran_have_their_middles_in_place() {
         let path = folder.path().join("deck.nas");
         fs::write(&path, deck).expect("written");
         let raw = read(&path);
-        let mesh = raw.mesh.as_ref().expect("a surface");
+        let mesh = raw.data.mesh.as_ref().expect("a surface");
         assert_encloses(mesh, &raw.nodes, volume, area);
         let told: Vec<&str> = raw.diagnostics.iter().map(|d| d.message()).collect();
         assert_eq!(told, ["elements that are not drawn: 1 of CTRIAX6"], "{name}");
@@ -173,7 +173,7 @@ fn meshes_of_vtk_give_the_surface_of_their_cells() {
         let path = folder.path().join("mesh.vtu");
         fs::write(&path, text).expect("written");
         let raw = read(&path);
-        let mesh = raw.mesh.as_ref().unwrap_or_else(|| panic!("{kind}: a surface"));
+        let mesh = raw.data.mesh.as_ref().unwrap_or_else(|| panic!("{kind}: a surface"));
         assert_encloses(mesh, &raw.nodes, volume, area);
     }
 }
@@ -183,7 +183,7 @@ fn meshes_of_vtk_give_the_surface_of_their_cells() {
 fn meshes_of_exodus_give_the_surface_of_their_elements() {
     for name in ["tet4.exo", "tet4_classic.exo"] {
         let raw = read(&fixtures().join("small/meshes").join(name));
-        let mesh = raw.mesh.as_ref().expect(name);
+        let mesh = raw.data.mesh.as_ref().expect(name);
         assert_closed(mesh);
         assert_eq!((mesh.triangles().len(), mesh.edges().len()), (4, 6), "{name}");
         assert!(volume_and_area(mesh.triangles(), &raw.nodes.positions).0 > 0.0, "{name}");
@@ -195,7 +195,7 @@ fn meshes_of_exodus_give_the_surface_of_their_elements() {
 fn meshes_of_gmsh_give_the_surface_once() {
     for name in ["block41.msh", "block22.msh"] {
         let raw = read(&fixtures().join("small/meshes").join(name));
-        assert_encloses(raw.mesh.as_ref().expect("a surface"), &raw.nodes, 2.0, 10.0);
+        assert_encloses(raw.data.mesh.as_ref().expect("a surface"), &raw.nodes, 2.0, 10.0);
     }
 }
 
@@ -203,7 +203,7 @@ fn meshes_of_gmsh_give_the_surface_once() {
 #[test]
 fn elements_of_the_second_order_have_their_middles_in_place() {
     let raw = read(&fixtures().join("small/meshes/second_order.msh"));
-    let mesh = raw.mesh.as_ref().expect("a surface");
+    let mesh = raw.data.mesh.as_ref().expect("a surface");
     let x = &raw.nodes.positions;
     let root = 2f64.sqrt();
     let tetrahedron = (1.0 / 6.0, 1.5 + 3f64.sqrt() / 2.0);
@@ -281,7 +281,7 @@ fn archives_of_ansys_give_the_surface() {
     let path = folder.path().join("part.cdb");
     fs::write(&path, &text).expect("written");
     let raw = read(&path);
-    let mesh = raw.mesh.as_ref().expect("a surface");
+    let mesh = raw.data.mesh.as_ref().expect("a surface");
     // Twelve triangles of the brick, four of the tetrahedron, one of the shell.
     assert_eq!(mesh.triangles().len(), 17);
     assert!(mesh.edges().contains(&[9, 10]), "the beam");
@@ -316,7 +316,7 @@ fn a_mesh_beside_tables_is_drawn_on_their_nodes() {
         fs::copy(fixtures().join("small/tet4").join(name), place.join(name)).expect("copied");
     }
     let table = read(&place.join("nodes.csv"));
-    assert_eq!(table.mesh, None);
+    assert_eq!(table.data.mesh, None);
     let deck = |scale: f64, first: i64| {
         let mut deck = "*NODE\n".to_owned();
         for (id, x) in table.nodes.ids.iter().zip(&table.nodes.positions) {
@@ -334,9 +334,12 @@ fn a_mesh_beside_tables_is_drawn_on_their_nodes() {
     fs::write(place.join("part.inp"), deck(1.0, first)).expect("written");
     let model = |manifest: &Path| read_model(&read_manifest(manifest).expect("a manifest"));
     let raw = model(&manifest).expect("a model");
-    assert_eq!(raw.mesh.as_ref().map(|mesh| mesh.triangles().len()), Some(4));
+    assert_eq!(raw.data.mesh.as_ref().map(|mesh| mesh.triangles().len()), Some(4));
     assert!(
-        raw.sources.iter().any(|source| (source.role.as_str(), source.name.as_str()) == ("mesh", "part.inp"))
+        raw.data
+            .sources
+            .iter()
+            .any(|source| (source.role.as_str(), source.name.as_str()) == ("mesh", "part.inp"))
     );
     for (text, part) in [
         (deck(1000.0, first), "of the mesh lies at"),

@@ -18,7 +18,7 @@ use oracle::reference::dense;
 /// Returns the bracket with dashpots between pairs of nodes, and with recoveries that have columns of the inertia of the deformation.
 fn damped_bracket(coupling: Coupling) -> RawModel {
     let mut raw = bracket(&mesh(), coupling);
-    raw.recoveries.iter_mut().for_each(|one| one.deformed_inertia = true);
+    raw.data.recoveries.iter_mut().for_each(|one| one.deformed_inertia = true);
     let n = raw.nodes.len();
     let mut random = Random(17);
     let mut entries = Vec::new();
@@ -35,12 +35,12 @@ fn damped_bracket(coupling: Coupling) -> RawModel {
         }
     }
     let matrix = CscMatrix::from_triplets(3 * n, 3 * n, &entries);
-    raw.damping = Some(Damping::Matrix(RawMatrix { matrix, ..raw.stiffness.clone() }));
+    raw.data.damping = Some(Damping::Matrix(RawMatrix { matrix, ..raw.stiffness.clone() }));
     raw
 }
 
 fn damping(raw: &RawModel) -> CscMatrix {
-    match &raw.damping {
+    match &raw.data.damping {
         Some(Damping::Matrix(damping)) => damping.matrix.clone(),
         _ => panic!("a damping matrix"),
     }
@@ -86,7 +86,7 @@ fn whole(body: &FlexBody, recovery: &Recovery, load: MotionLoad) -> Mat<f64> {
 
 /// Returns the rows of the static solutions of all nodes (rows x loads): stresses, and T_S'K u of the cut.
 fn exact(raw: &RawModel, statics: &Statics, name: &str, loads: &Mat<f64>) -> Mat<f64> {
-    let operator = &raw.recoveries.iter().find(|one| one.name == name).expect("a recovery").operator;
+    let operator = &raw.data.recoveries.iter().find(|one| one.name == name).expect("a recovery").operator;
     let solved: Vec<Vec<f64>> = (0..loads.ncols())
         .map(|c| {
             let u = statics.solve(&loads.as_ref().subcols(c, 1).to_owned());
@@ -195,14 +195,14 @@ fn eigenmodes_need_no_columns_of_their_acceleration() {
 fn columns_are_there_where_they_are_needed() {
     let coupled = |coupling: Coupling, damping: Option<Damping<_>>, basis: BasisChoice, inertia: bool| {
         let mut raw = damped_bracket(coupling);
-        raw.damping = damping;
-        raw.recoveries.iter_mut().for_each(|one| one.deformed_inertia = inertia);
+        raw.data.damping = damping;
+        raw.data.recoveries.iter_mut().for_each(|one| one.deformed_inertia = inertia);
         let body = body(raw, basis, 4, BodyFrame::Com);
         body.recoveries()[0].motion.iter().map(|one| one.load).collect::<Vec<_>>()
     };
     let kinds = |damping, basis, inertia| coupled(Coupling::Averaging, damping, basis, inertia);
     let rayleigh = || Some(Damping::Rayleigh { alpha: 3.0, beta: 1e-5 });
-    let matrix = || damped_bracket(Coupling::Averaging).damping;
+    let matrix = || damped_bracket(Coupling::Averaging).data.damping;
     let craig = || BasisChoice::CraigBampton(CraigBampton);
     assert_eq!(kinds(None, BasisChoice::default(), false), []);
     assert_eq!(kinds(Some(Damping::Ratio(0.02)), craig(), false), []);

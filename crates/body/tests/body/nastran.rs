@@ -24,10 +24,10 @@ fn said(raw: &RawModel) -> Vec<Code> {
 #[test]
 fn both_forms_of_nastran_are_one_model() {
     let punched = job(&main_file("nastran"), vec![set("left", "set5"), set("right", "6")]);
-    assert_eq!(punched.interfaces[0].nodes, [11, 17, 20]);
-    assert_eq!(punched.interfaces[1].nodes, [35, 38, 41, 44]);
+    assert_eq!(punched.data.interfaces[0].nodes, [11, 17, 20]);
+    assert_eq!(punched.data.interfaces[1].nodes, [35, 38, 41, 44]);
     assert_eq!(said(&punched), []);
-    let names: Vec<&str> = punched.sources.iter().map(|source| source.name.as_str()).collect();
+    let names: Vec<&str> = punched.data.sources.iter().map(|source| source.name.as_str()).collect();
     assert_eq!(names, ["job.bdf", "grids.bdf", "job.pch"]);
     let output = job(&main_file("nastran_op4"), Vec::new());
     assert_eq!(said(&output), [Code::RowsEmpty], "empty rotations of solids, and a scalar point");
@@ -228,7 +228,7 @@ fn files_that_the_deck_assigns_are_found() {
             (&expected.stiffness.matrix, &expected.mass.matrix)
         );
         let name = pair[1].file_name().and_then(|name| name.to_str()).expect("a name");
-        assert!(raw.sources.iter().any(|source| source.name == name), "{name}");
+        assert!(raw.data.sources.iter().any(|source| source.name == name), "{name}");
     }
     fs::remove_file(&places[2]).expect("removed");
     let error = read(&path).expect_err("no matrices");

@@ -293,7 +293,7 @@ fn what_is_given_by_rows_is_turned_with_k() {
     let manifest = folder.path().join("model.toml");
     fs::write(&manifest, "[files]\njob = \"job.bdf\"\n[damping]\nmatrix = \"D.mtx\"\n").expect("written");
     let raw = read_model(&read_manifest(&manifest).expect("a manifest")).expect("a model");
-    let Some(Damping::Matrix(damping)) = &raw.damping else { panic!("a damping matrix") };
+    let Some(Damping::Matrix(damping)) = &raw.data.damping else { panic!("a damping matrix") };
     let difference = dense(&damping.matrix) - 2e-5 * dense(&raw.stiffness.matrix);
     assert!(difference.norm_max() < 1e-13 * dense(&damping.matrix).norm_max(), "{}", difference.norm_max());
 
@@ -375,7 +375,7 @@ fn matrices_of_the_g_set_fit_beside_reduced_rows() {
     let manifest = folder.path().join("model.toml");
     fs::write(&manifest, "[files]\njob = \"job.bdf\"\n[damping]\nmatrix = \"D.mtx\"\n").expect("written");
     let raw = read_model(&read_manifest(&manifest).expect("a manifest")).expect("a model");
-    let Some(Damping::Matrix(damping)) = &raw.damping else { panic!("a damping matrix") };
+    let Some(Damping::Matrix(damping)) = &raw.data.damping else { panic!("a damping matrix") };
     assert_eq!(damping.matrix.n_cols(), raw.stiffness.matrix.n_cols());
     let difference = dense(&damping.matrix) - dense(&raw.stiffness.matrix);
     assert!(difference.norm_max() < 1e-12 * dense(&damping.matrix).norm_max());

@@ -35,7 +35,7 @@ fn decided(model: &FeModel, settings: &ConvertSettings, terms: &[TermDecision]) 
 fn models() -> [(FeModel, u64, u64); 4] {
     let nf = MODES as u64;
     let mut damped = rectangle(6, 3, 0.3, [5.0, -2.0]);
-    damped.damping = Some(Damping::Rayleigh { alpha: 0.1, beta: 1e-6 });
+    damped.data.damping = Some(Damping::Rayleigh { alpha: 0.1, beta: 1e-6 });
     [
         (fixture("connecting_rod"), 4, 4 + 3 * nf),
         (fixture("shell_folded"), 6, 6 + 4 * nf),

@@ -46,7 +46,7 @@ pub(crate) fn bracket(mesh: &Mesh, coupling: Coupling) -> RawModel {
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let set =
         |(name, nodes): (&str, Vec<i64>)| NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes) };
-    raw.interfaces = ["first", "second"].into_iter().zip(ends()).map(set).collect();
+    raw.data.interfaces = ["first", "second"].into_iter().zip(ends()).map(set).collect();
     let lattice = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL).nodes;
     let side = (1..).zip(&lattice).filter(|(_, x)| x[0] > 2.9 * CELL).map(|(id, _)| id).collect();
     let cut = RecoveryOperator::Cut { nodes: side, about: mesh.nodes[0] };
@@ -56,7 +56,7 @@ pub(crate) fn bracket(mesh: &Mesh, coupling: Coupling) -> RawModel {
         path: PathBuf::new(),
         deformed_inertia: false,
     };
-    raw.recoveries = vec![mesh.stresses(&Material::STEEL), cut];
+    raw.data.recoveries = vec![mesh.stresses(&Material::STEEL), cut];
     raw
 }
 
@@ -138,16 +138,18 @@ impl Statics {
         let nodes = raw.nodes.positions.clone();
         let n = k.nrows();
         let taken: Vec<usize> = match rigid {
-            true => raw.interfaces.iter().flat_map(|set| &set.nodes).map(|id| *id as usize - 1).collect(),
+            true => {
+                raw.data.interfaces.iter().flat_map(|set| &set.nodes).map(|id| *id as usize - 1).collect()
+            }
             false => Vec::new(),
         };
         let free: Vec<usize> = (0..n).filter(|row| !taken.contains(&(row / 3))).collect();
-        let sets = if rigid { raw.interfaces.len() } else { 0 };
+        let sets = if rigid { raw.data.interfaces.len() } else { 0 };
         let mut coupling = Mat::zeros(n, free.len() + 6 * sets);
         for (j, &row) in free.iter().enumerate() {
             coupling[(row, j)] = 1.0;
         }
-        for (s, set) in raw.interfaces.iter().take(sets).enumerate() {
+        for (s, set) in raw.data.interfaces.iter().take(sets).enumerate() {
             let centre = centre_of(&nodes, &set.nodes);
             for id in &set.nodes {
                 let i = *id as usize - 1;
@@ -205,7 +207,7 @@ impl Statics {
             case.spin.cross(&case.spin.cross(&Vector3::from(self.nodes[row / 3])))[row % 3]
         });
         let mut f = &self.m * acceleration * Scale(-1.0);
-        for (set, [force, torque]) in raw.interfaces.iter().zip(case.loads) {
+        for (set, [force, torque]) in raw.data.interfaces.iter().zip(case.loads) {
             let centre = centre_of(&self.nodes, &set.nodes);
             // A = R (R'R)^-1 spreads the resultant.
             let rows = 3 * set.nodes.len();
@@ -253,7 +255,7 @@ pub(crate) fn error(found: &[f64], expected: &[f64]) -> f64 {
 fn exact(raw: &RawModel, case: &Case, rigid: bool) -> Vec<f64> {
     let statics = Statics::new(raw, rigid);
     let u = statics.solve(&statics.forces(raw, case));
-    let RecoveryOperator::Rows { transposed, .. } = &raw.recoveries[0].operator else {
+    let RecoveryOperator::Rows { transposed, .. } = &raw.data.recoveries[0].operator else {
         panic!("an operator")
     };
     rows_of(transposed, &u)
@@ -371,11 +373,13 @@ fn values_turn_with_the_model_and_do_not_depend_on_its_order() {
     renumbered.mass.matrix = plain.mass.matrix.permuted(&reversed);
     renumbered.nodes.ids.reverse();
     renumbered.nodes.positions.reverse();
-    let RecoveryOperator::Rows { transposed, labels, .. } = &plain.recoveries[0].operator else { panic!() };
+    let RecoveryOperator::Rows { transposed, labels, .. } = &plain.data.recoveries[0].operator else {
+        panic!()
+    };
     let entries: Vec<(u32, u32, f64)> = oracle::mesh::entries(transposed)
         .map(|(row, column, v)| (reversed[row as usize], column, v))
         .collect();
-    renumbered.recoveries[0].operator = RecoveryOperator::Rows {
+    renumbered.data.recoveries[0].operator = RecoveryOperator::Rows {
         transposed: CscMatrix::from_triplets(3 * n, transposed.n_cols(), &entries),
         labels: labels.clone(),
         offset: None,
@@ -417,7 +421,7 @@ fn stresses_under_a_slow_sine_load_follow_those_of_all_nodes() {
     let case = Case::random(6, 0.0, 1e4);
     let statics = Statics::new(&raw, false);
     let load = all.shapes.transpose() * statics.forces(&raw, &case);
-    let RecoveryOperator::Rows { transposed, .. } = &raw.recoveries[0].operator else {
+    let RecoveryOperator::Rows { transposed, .. } = &raw.data.recoveries[0].operator else {
         panic!("an operator")
     };
     let stress_of_modes: Vec<Vec<f64>> = (0..all.eigenvalues.len())
@@ -486,7 +490,9 @@ fn section_forces_are_the_loads_less_the_inertia_of_one_side() {
         let basis = if rigid { BasisChoice::CraigBampton(CraigBampton) } else { BasisChoice::default() };
         let body = body(raw.clone(), basis, 5, BodyFrame::Principal);
         let statics = Statics::new(&raw, rigid);
-        let RecoveryOperator::Cut { nodes, about } = &raw.recoveries[1].operator else { panic!("a cut") };
+        let RecoveryOperator::Cut { nodes, about } = &raw.data.recoveries[1].operator else {
+            panic!("a cut")
+        };
         for (name, case) in cases() {
             let f = statics.forces(&raw, &case);
             let u = statics.solve(&f);
@@ -511,7 +517,7 @@ fn cuts_of_a_frame_are_the_end_forces_of_its_beams() {
     let mut raw = elbow(4);
     let n = raw.nodes.len();
     let ends = [1, n as i64];
-    raw.interfaces = ends.map(|id| NodeSet::new(format!("end {id}"), vec![id])).to_vec();
+    raw.data.interfaces = ends.map(|id| NodeSet::new(format!("end {id}"), vec![id])).to_vec();
     // Rows of K that couple nodes 1 to 3 with the others belong to the beam between nodes 3 and 4 alone: the resultant
     // of these nodes about node 3 is the end force of this beam there.
     let side: Vec<i64> = vec![1, 2, 3];
@@ -556,7 +562,7 @@ fn cuts_of_a_frame_are_the_end_forces_of_its_beams() {
         path: PathBuf::new(),
         deformed_inertia: false,
     };
-    raw.recoveries =
+    raw.data.recoveries =
         vec![recovery("beam", rows), recovery("cut", RecoveryOperator::Cut { nodes: side, about })];
     let body = body(raw, BasisChoice::default(), 4, BodyFrame::Principal);
     for (name, case) in [("spin", Case::random(5, 0.1, 0.0)), ("loads", Case::random(6, 0.0, 1e-3))] {
@@ -581,7 +587,8 @@ fn operators_of_another_model_are_refused_by_name() {
     };
     let with_rows = |change: &dyn Fn(&CscMatrix, &mut Vec<RecoveryRow>) -> CscMatrix| {
         refused(&|raw: &mut RawModel| {
-            let RecoveryOperator::Rows { transposed, labels, .. } = &mut raw.recoveries[0].operator else {
+            let RecoveryOperator::Rows { transposed, labels, .. } = &mut raw.data.recoveries[0].operator
+            else {
                 panic!("an operator")
             };
             *transposed = change(transposed, labels);
@@ -626,7 +633,9 @@ fn operators_of_another_model_are_refused_by_name() {
     assert!(code == Code::RecoveryRows && message.contains("twice"), "{message}");
     // Displacements may follow rigid motion.
     let mut raw = plain.clone();
-    let RecoveryOperator::Rows { transposed, labels, .. } = &mut raw.recoveries[0].operator else { panic!() };
+    let RecoveryOperator::Rows { transposed, labels, .. } = &mut raw.data.recoveries[0].operator else {
+        panic!()
+    };
     *transposed = CscMatrix::from_triplets(transposed.n_rows(), 1, &[(5, 0, 1.0)]);
     labels.truncate(1);
     labels[0].quantity = Quantity::Displacement;
@@ -637,19 +646,19 @@ fn operators_of_another_model_are_refused_by_name() {
     {
         let (code, message) = refused(&|raw: &mut RawModel| {
             let operator = RecoveryOperator::Cut { nodes: nodes.clone(), about: [0.0; 3] };
-            raw.recoveries[1].operator = operator;
+            raw.data.recoveries[1].operator = operator;
         });
         assert!(code == Code::RecoveryCut && message.contains(says), "{message}");
     }
-    let (code, message) = refused(&|raw: &mut RawModel| raw.recoveries[1].name = "stress".to_owned());
+    let (code, message) = refused(&|raw: &mut RawModel| raw.data.recoveries[1].name = "stress".to_owned());
     assert!(code == Code::ManifestSyntax && message.contains("twice"), "{message}");
 }
 
 #[test]
 fn a_cut_through_a_rigid_interface_is_refused() {
     let mut raw = bracket(&mesh(), Coupling::Rigid);
-    let side: Vec<i64> = raw.interfaces[0].nodes[1..].to_vec();
-    raw.recoveries[1].operator = RecoveryOperator::Cut { nodes: side, about: [0.0; 3] };
+    let side: Vec<i64> = raw.data.interfaces[0].nodes[1..].to_vec();
+    raw.data.recoveries[1].operator = RecoveryOperator::Cut { nodes: side, about: [0.0; 3] };
     let settings = ConvertSettings {
         modes: lowest(3),
         basis: BasisChoice::CraigBampton(CraigBampton),

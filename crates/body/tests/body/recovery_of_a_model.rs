@@ -58,7 +58,7 @@ fn every_number_of_recoveries_and_named_loads_is_computed_again() {
         let n = raw.stiffness.matrix.n_rows();
         let forces = (0..n).map(|i| ((7 * i + 3) % 11) as f64 - 5.0).collect();
         let (name, path) = ("wind".to_owned(), "f.npy".into());
-        raw.named_loads = vec![ModelLoad { name, forces, preload: false, path }];
+        raw.data.named_loads = vec![ModelLoad { name, forces, preload: false, path }];
         raw
     };
     let model = FeModel::from_raw(raw()).expect("a model").model;

@@ -38,7 +38,7 @@ fn model(plate: &Assembly) -> FeModel {
     };
     let left = edge(&|i| i % 9 == 0);
     let corner = edge(&|i| i == 8);
-    raw.interfaces = vec![NodeSet::new("edge", left), NodeSet::new("corner", corner)];
+    raw.data.interfaces = vec![NodeSet::new("edge", left), NodeSet::new("corner", corner)];
     FeModel::from_raw(raw).expect("a sound model").model
 }
 

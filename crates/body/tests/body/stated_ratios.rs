@@ -8,7 +8,7 @@ use flexbody_body::flex_body::{Carrier, FlexBody};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
-use flexbody_model::{Coupling, Damping, DampingBand, FeModel, NodeSet, RawMatrix, RawModel, ratio_at};
+use flexbody_model::{Coupling, Damping, DampingBand, FeModel, NodeSet, RawMatrix, ratio_at};
 use nalgebra::DMatrix;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
@@ -23,7 +23,10 @@ fn body(damping: &Damping<RawMatrix>, frame: FrameChoice) -> FlexBody {
     let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 1e-9);
     let root = NodeSet::new(ROOT, nodes.map(|(id, _)| *id).collect());
     let interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..root }];
-    let model = FeModel::from_raw(RawModel { interfaces, damping: Some(damping.clone()), ..raw });
+    let model = FeModel::from_raw(raw.with(|data| {
+        data.interfaces = interfaces;
+        data.damping = Some(damping.clone());
+    }));
     let settings = ConvertSettings {
         frame,
         modes: ModeSettings { wanted: Wanted::Lowest(12), ..ModeSettings::default() },

@@ -87,7 +87,7 @@ fn numbers_must_be_finite_and_meaningful() {
     assert_refused(|p| p.modes.damping_ratio[2] = -0.1, &["`modes.damping_ratio` is -1e-1 at mode 2"]);
     assert_refused(|p| p.lumped[0].comparison.push(("x".into(), f64::NAN)), &[" x` has the value NaN"]);
     assert_refused(
-        |p| p.units = UnitSystem::parse("m", "kg", "1e-200").unwrap(),
+        |p| p.description.units = UnitSystem::parse("m", "kg", "1e-200").unwrap(),
         &["`units.time` is 1e-200 s, too short"],
     );
 }
@@ -126,7 +126,7 @@ fn names_are_unique_and_can_be_stored() {
     );
     assert_refused(|p| p.lumped[1].scheme = p.lumped[0].scheme.clone(), &["is given twice"]);
     assert_refused(|p| p.lumped[1].scheme = "x".repeat(1001), &["has 1001 bytes"]);
-    assert_refused(|p| p.source.name.push('\0'), &["`source.name` contains a NUL character"]);
+    assert_refused(|p| p.description.name.push('\0'), &["`source.name` contains a NUL character"]);
     assert_refused(|p| p.certificate.remark.push('\0'), &["`certificate.remark` contains a NUL character"]);
 }
 
@@ -151,7 +151,7 @@ fn frequencies_are_in_hertz_in_any_unit_of_time() {
     let mut p = parts(Random::new(3), 4, 1, 0, 0);
     p.modes.eigenvalue = vec![4.0 * std::f64::consts::PI.powi(2)];
     for (time, expected) in [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("0.5", 2.0)] {
-        p.units = UnitSystem::parse("mm", "t", time).unwrap();
+        p.description.units = UnitSystem::parse("mm", "t", time).unwrap();
         let found = FlexBody::new(p.clone()).unwrap().frequencies_hz();
         assert!((found[0] / expected - 1.0).abs() < 1e-15, "{time}: {found:?}");
     }

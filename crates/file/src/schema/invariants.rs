@@ -198,5 +198,5 @@ pub(super) const INERTIA_STIFFNESS: &[Item] = &[
 ];
 
 fn load_units(view: &View<'_>) -> Option<Value> {
-    text(Units::Of(of_load(view.unit_load()?)).concrete(&view.body.units))
+    text(Units::Of(of_load(view.unit_load()?)).concrete(&view.body.description.units))
 }

@@ -50,9 +50,9 @@ fn selected(item: &Item, dims: &[usize], values: &[f64], modes: &[usize], nf: us
 
 /// Static columns of recoveries take the response of the modes that are dropped.
 fn takes_dropped_modes(path: &str) -> bool {
-    let of_motion = MotionLoad::ALL.map(|load| format!("/recovery/<name>/{}", load.name()));
+    let mut of_motion = MotionLoad::ALL.iter().map(|load| format!("/recovery/<name>/{}", load.name()));
     ["spin", "named", "loads"].iter().any(|name| path == format!("/recovery/<name>/{name}"))
-        || of_motion.iter().any(|own| own == path)
+        || of_motion.any(|own| own == path)
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn converted(model: &FeModel, basis: BasisChoice, modes: usize) -> FlexBody {
 /// Returns a link with interfaces of this `coupling`.
 fn link(coupling: Coupling) -> FeModel {
     let mut raw = raw_fixture("robot_link");
-    raw.interfaces.iter_mut().for_each(|set| set.coupling = Some(coupling));
+    raw.data.interfaces.iter_mut().for_each(|set| set.coupling = Some(coupling));
     model_of(raw)
 }
 

@@ -199,7 +199,7 @@ fn header(
     let real = if precision == 8 { "double" } else { "float" };
     sizes.0 += &format!("\ntypedef {real} flexbody_real;\n{}", frame_names(content));
     let text = TEMPLATE.replace("/* SIZES */", sizes.0.trim_end()).replace("SUMMARY", &summary(body));
-    let own = identifier(&body.source().name);
+    let own = identifier(&body.description().name);
     if own.is_empty() {
         return text;
     }
@@ -212,7 +212,7 @@ fn summary(body: &FlexBody) -> String {
     let units = body.units();
     format!(
         "Body `{}`: {} modes, units {}, {}, {}.",
-        plain(&body.source().name),
+        plain(&body.description().name),
         body.n_modes(),
         plain(units.length.name()),
         plain(units.mass.name()),

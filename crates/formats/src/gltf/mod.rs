@@ -170,7 +170,7 @@ impl<'b> DrawnScene<'b> {
         let mut document = json!({
             "asset": { "version": "2.0", "generator": generator() },
             "scene": 0,
-            "scenes": [{ "name": self.body.source().name, "nodes": [AXES] }],
+            "scenes": [{ "name": self.body.description().name, "nodes": [AXES] }],
             "nodes": nodes,
             "meshes": [mesh],
             "materials": [
@@ -221,7 +221,7 @@ impl<'b> DrawnScene<'b> {
         if primitives.is_empty() {
             primitives.push(json!({ "mode": 0, "attributes": attributes, "material": 1 }));
         }
-        let mut mesh = json!({ "name": self.body.source().name });
+        let mut mesh = json!({ "name": self.body.description().name });
         if !targets.is_empty() {
             primitives.iter_mut().for_each(|primitive| primitive["targets"] = json!(targets));
             mesh["weights"] = json!(vec![0.0; targets.len()]);
@@ -261,7 +261,7 @@ impl<'b> DrawnScene<'b> {
             }
             None => single(self.origin * self.metres)?,
         };
-        let mut body = json!({ "name": self.body.source().name, "mesh": 0, "translation": start });
+        let mut body = json!({ "name": self.body.description().name, "mesh": 0, "translation": start });
         if let Some(played) = played {
             let attitude = <[f64; 4]>::from(played.attitude(0).coords);
             body["rotation"] = json!(attitude.map(|x| x as f32));

@@ -17,7 +17,7 @@ use flexbody_body::invariants::{
 };
 use flexbody_body::verification::body_identities;
 use flexbody_linalg::larger;
-use flexbody_model::Nodes;
+use flexbody_model::{Description, Nodes};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
 
@@ -205,9 +205,9 @@ fn parts(
     let given = &file.body;
     let invariants = &coordinates.invariants;
     Parts {
+        description: Description::new(&file.body.name, given.units.clone().unwrap_or(units)),
         source: source_facts(file, invariants, source),
         dimension: 3,
-        units: given.units.clone().unwrap_or(units),
         frame: Frame::model(),
         conditions,
         nodes: nodes(&given.frames),
@@ -237,9 +237,7 @@ fn parts(
 /// Returns the provenance of the body.
 fn source_facts(file: &ImportedFile, invariants: &Invariants, source: SourceFile) -> Source {
     Source {
-        name: file.body.name.clone(),
         files: vec![source],
-        number: None,
         // The file does not state the degrees of freedom of the model.
         n_dofs: 0,
         mass_structure: match invariants.general() {

@@ -136,7 +136,7 @@ fn head(body: &FlexBody) -> String {
     const LONGEST_NAME: usize = 200;
     let units = body.units();
     let printable = |c: char| if c.is_control() { ' ' } else { c };
-    let name: String = body.source().name.chars().map(printable).take(LONGEST_NAME).collect();
+    let name: String = body.description().name.chars().map(printable).take(LONGEST_NAME).collect();
     let general = body.invariants().general().map_or("", |_| GENERAL_MASS);
     // A name alone could be read as a record group.
     format!(

@@ -182,7 +182,7 @@ fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String
     text.line(1, "part");
     match dialect.modal_name {
         ModalName::Absent => text.line(6, "new modal"),
-        ModalName::OfBody => text.value(6, "new modal", word(&body.source().name)),
+        ModalName::OfBody => text.value(6, "new modal", word(&body.description().name)),
         ModalName::Fixed(name) => text.value(6, "new modal", name),
     }
     refmod(body, &mut text);
@@ -230,7 +230,7 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
     if !without.is_empty() {
         facts.push(format!("without {}", without.join(" ")));
     }
-    let name = &body.source().name;
+    let name = &body.description().name;
     if !name.is_empty() {
         facts.push(format!("body {}", name.replace(char::is_control, " ")));
     }

@@ -83,7 +83,7 @@ const PROPERTIES: &[Property] = &[
     Property {
         name: "units",
         moves: false,
-        remove: |parts| parts.units = UnitSystem::parse("mm", "t", "s").expect("units"),
+        remove: |parts| parts.description.units = UnitSystem::parse("mm", "t", "s").expect("units"),
         entry: |list| &list.units,
     },
     Property {

@@ -529,7 +529,7 @@ fn indices_that_lead_nowhere_are_refused() {
 fn any_name_makes_a_header_that_compiles() {
     for name in ["*/ int x; /*", "??/\n#error", "", "Ärger 2", "9"] {
         let mut parts = fixture("hex8_edges", 4, BodyFrame::Model).into_parts();
-        parts.source.name = name.to_owned();
+        parts.description.name = name.to_owned();
         let body = FlexBody::new(parts).expect("valid parts");
         let compiled = Compiled::new(exported(&body, "double", &Points::Nodes), &["-O0"]);
         assert!(error(&compiled, &body, &Points::Nodes, 8) < ROUNDINGS * 0.5 * f64::EPSILON);

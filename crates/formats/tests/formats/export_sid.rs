@@ -330,7 +330,7 @@ fn every_dialect_of_every_fixture_is_read_back_as_the_body() {
                     }
                 }
                 assert_eq!(found.units.as_ref(), body.units().stated.then_some(body.units()));
-                assert_eq!(found.name, body.source().name);
+                assert_eq!(found.name, body.description().name);
             }
         }
     }
@@ -459,7 +459,7 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
 fn the_part_has_a_name_in_the_dialects_that_have_one() {
     let mut parts = fixture("hex8_edges", 4, BodyFrame::Model).into_parts();
     for (name, word) in [("Rotor = 2, left", "= Rotor_2,_left"), ("", "=")] {
-        parts.source.name = name.to_owned();
+        parts.description.name = name.to_owned();
         let body = FlexBody::new(parts.clone()).expect("valid parts");
         for (dialect_name, named) in
             [("fembs", word), ("py-sid", word), ("morembs", ""), ("fembeam", ""), ("embs", "= body")]
@@ -498,7 +498,7 @@ fn embs_has_keywords_in_the_heads_of_its_arrays_alone_and_lines_that_its_reader_
     let mut parts = fixture("bracket_hex20", 12, BodyFrame::Model).into_parts();
     let long = "Kurbel größer ".repeat(90);
     for name in ["Crank", "Gear", "Joint_A", "frame refmod mass Me De", "", "Größe 日本 mdCM", &long] {
-        parts.source.name = name.to_owned();
+        parts.description.name = name.to_owned();
         let body = FlexBody::new(parts.clone()).expect("valid parts");
         let text = text(&body, &dialect("embs"));
         let mut inside: Vec<&str> = Vec::new();

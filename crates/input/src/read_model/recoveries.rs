@@ -88,7 +88,7 @@ fn recovery(
                 energies: energies.as_ref().map(|path| opened.unread(path)).transpose()?,
                 listed: listed.iter().map(|path| opened.unread(path)).collect::<Diagnosed<_>>()?,
             };
-            let (operator, found) = read_answers(&answer_files, &files.units)?;
+            let (operator, found) = read_answers(&answer_files, &files.description.units)?;
             Ok((ModelRecovery { name, operator, path: answers.clone(), deformed_inertia }, found))
         }
         OperatorSource::Cut { nodes, about } => {

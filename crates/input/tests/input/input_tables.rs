@@ -132,8 +132,8 @@ nodes_file = "right.csv"
     .unwrap();
     let folder = files.manifest.as_ref().unwrap().parent().unwrap().to_path_buf();
     let tables = files.tables().expect("tables");
-    assert_eq!((files.name.as_str(), files.dimension, &tables.dofs), ("beam", 2, &None));
-    let units = &files.units;
+    assert_eq!((files.description.name.as_str(), files.dimension, &tables.dofs), ("beam", 2, &None));
+    let units = &files.description.units;
     assert_eq!((units.length.to_si(), units.mass.to_si(), units.time.to_si()), (1e-3, 1000.0, 1e-3));
     assert_eq!((units.mass.name(), units.time.name(), units.stated), ("1000", "1e-3", true));
     assert_eq!(
@@ -156,7 +156,7 @@ fn the_manifest_of_the_documentation_is_in_order() {
         .expect("an example");
     let files = manifest(example).unwrap();
     assert_eq!(
-        (files.name.as_str(), files.units.mass.to_si(), files.interfaces.len()),
+        (files.description.name.as_str(), files.description.units.mass.to_si(), files.interfaces.len()),
         ("conrod", 1000.0, 2)
     );
     let docs = include_str!("../../../../docs/how_to/from_fe_programs.md");
@@ -171,7 +171,10 @@ fn the_manifest_of_the_documentation_is_in_order() {
 #[test]
 fn a_manifest_may_say_little() {
     let files = manifest("files = { stiffness = 'K.mtx', mass = 'M.mtx', nodes = 'n.csv' }").unwrap();
-    assert_eq!((files.name.as_str(), files.dimension, files.units.stated), ("model", 3, false));
+    assert_eq!(
+        (files.description.name.as_str(), files.dimension, files.description.units.stated),
+        ("model", 3, false)
+    );
     assert!(files.interfaces.is_empty());
 }
 
@@ -320,10 +323,10 @@ fn a_whole_model_is_read_with_its_fingerprints() {
     ];
     let model = read_model(&files).unwrap();
     assert_eq!((model.stiffness.matrix.n_rows(), model.mass.matrix.n_rows(), model.nodes.len()), (12, 12, 4));
-    assert_eq!(model.interfaces[1].nodes, [30, 10]);
+    assert_eq!(model.data.interfaces[1].nodes, [30, 10]);
     assert!(model.diagnostics.is_empty(), "{:?}", model.diagnostics);
-    let of = |role: &str| model.sources.iter().find(|s| s.role == role).expect(role);
-    let roles: Vec<&str> = model.sources.iter().map(|s| s.role.as_str()).collect();
+    let of = |role: &str| model.data.sources.iter().find(|s| s.role == role).expect(role);
+    let roles: Vec<&str> = model.data.sources.iter().map(|s| s.role.as_str()).collect();
     assert_eq!(roles, ["stiffness", "mass", "nodes", "dofs", "interface"]);
     assert_eq!(of("nodes").name, "nodes.csv");
     let bytes = std::fs::read(path("K.mtx")).unwrap();
@@ -339,7 +342,7 @@ fn one_file_in_two_roles_is_fingerprinted_in_both_and_blamed_once() {
     let files = ModelFiles::from_arguments(&both, &both, tet4().join("nodes.csv"), None, None).unwrap();
     let model = read_model(&files).unwrap();
     assert_ne!(model.stiffness.matrix, model.mass.matrix);
-    assert_eq!(model.sources[0].sha256, model.sources[1].sha256);
+    assert_eq!(model.data.sources[0].sha256, model.data.sources[1].sha256);
 
     let missing = folder.join("missing.h5");
     let files = ModelFiles::from_arguments(&missing, &missing, tet4().join("nodes.csv"), None, None).unwrap();

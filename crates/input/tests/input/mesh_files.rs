@@ -55,7 +55,7 @@ fn global_ids_and_marks_are_read() {
     let own = nodes();
     for name in ["tet4_raw.vtu", "tet4_raw_big_endian_64.vtu", "tet4_base64.vtu", "tet4_inline.vtu"] {
         let raw = tetrahedron(&mesh(name), None, &["left"]).unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert_eq!(raw.interfaces[0].nodes, [10, 30, 40], "{name}");
+        assert_eq!(raw.data.interfaces[0].nodes, [10, 30, 40], "{name}");
         let read: Vec<_> = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
         assert_eq!(read, own, "{name}");
         FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -71,8 +71,12 @@ fn meshes_of_exodus_have_nodes_and_sets() {
         let raw = tetrahedron(&mesh(name), None, &["left", "9"]).expect(name);
         let read: Vec<_> = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
         assert_eq!(read, own, "{name}");
-        assert_eq!(raw.interfaces[0].nodes, [10, 30, 40], "{name}");
-        assert_eq!(raw.interfaces[1].nodes, [20], "{name}: a set without a name is called by its number");
+        assert_eq!(raw.data.interfaces[0].nodes, [10, 30, 40], "{name}");
+        assert_eq!(
+            raw.data.interfaces[1].nodes,
+            [20],
+            "{name}: a set without a name is called by its number"
+        );
     }
     let raw = tetrahedron(&mesh("tet4.exo"), None, &[]).expect("readable");
     assert_eq!(raw.nodes.ids, [1, 2, 3, 4]);

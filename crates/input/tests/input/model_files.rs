@@ -16,7 +16,7 @@ fn nonzeros(matrix: &CscMatrix) -> Vec<(u32, u32, f64)> {
 fn a_model_read_from_files_is_the_one_written() {
     let mesh = Mesh::bracket(ElementKind::Tet10, 3, 1, 0.1);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.units = UnitSystem::parse("m", "kg", "s").expect("known units");
+    raw.data.description.units = UnitSystem::parse("m", "kg", "s").expect("known units");
     for (order, numbering) in [
         (None, Numbering::Consecutive),
         (Some(DofOrder::NodeMajor), Numbering::Gaps(1)),
@@ -36,8 +36,8 @@ fn a_model_read_from_files_is_the_one_written() {
             assert!(nonzeros(&read.mass.matrix) == nonzeros(&model.mass.matrix), "{what}: mass");
             assert_eq!(read.nodes, model.nodes, "{what}");
             assert_eq!(read.dofs, model.dofs, "{what}");
-            assert_eq!(read.units, model.units, "{what}");
-            assert_eq!(read.name, model.name, "{what}");
+            assert_eq!(read.data.description.units, model.data.description.units, "{what}");
+            assert_eq!(read.data.description.name, model.data.description.name, "{what}");
         }
     }
 }

@@ -57,8 +57,8 @@ fn nodes_of_ansys_are_those_of_the_table() {
         FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{shown}: {error}"));
     }
     let raw = tetrahedron(&mesh("tet4.cdb"), None, &["pin", "RUN"]).expect("readable");
-    assert_eq!(raw.interfaces[0].nodes, [10, 30]);
-    assert_eq!(raw.interfaces[1].nodes, [10, 20], "those of the range that there are");
+    assert_eq!(raw.data.interfaces[0].nodes, [10, 30]);
+    assert_eq!(raw.data.interfaces[1].nodes, [10, 20], "those of the range that there are");
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn meshes_of_gmsh_have_nodes_and_groups() {
     });
     for raw in &read {
         let at = |id: &i64| raw.nodes.ids.iter().position(|own| own == id).expect("a node");
-        let left = &raw.interfaces[0].nodes;
+        let left = &raw.data.interfaces[0].nodes;
         assert!(!left.is_empty() && left.iter().all(|id| raw.nodes.positions[at(id)][0] == 0.0));
     }
     let [a, b] = read;

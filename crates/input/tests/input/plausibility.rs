@@ -109,7 +109,7 @@ fn scaled(matrix: &CscMatrix, factor: f64) -> CscMatrix {
 
 fn in_units(raw: &RawModel, units: [&str; 3]) -> RawModel {
     let [length, mass, time] = units;
-    RawModel { units: UnitSystem::parse(length, mass, time).expect("units"), ..raw.clone() }
+    raw.clone().with(|data| data.description.units = UnitSystem::parse(length, mass, time).expect("units"))
 }
 
 fn with_stiffness_times(raw: &RawModel, factor: f64) -> RawModel {
@@ -338,7 +338,7 @@ fn densities_of_no_matter_are_refused() {
 /// make them plausible: densities of solids, speeds of sound of other models.
 #[test]
 fn numbers_without_units_are_those_of_matter() {
-    let unstated = |raw: RawModel| RawModel { units: UnitSystem::default(), ..raw };
+    let unstated = |raw: RawModel| raw.with(|data| data.description.units = UnitSystem::default());
     let bracket = unstated(raw_fixture("bracket_hex20"));
     let shell = unstated(with_stiffness_times(&raw_fixture("shell_folded"), 1e6));
     let frame = unstated(with_stiffness_times(&raw_fixture("frame_beams"), 1e6));
@@ -395,7 +395,7 @@ fn implausible(raw: &RawModel) -> Diagnostic {
 #[test]
 fn mixtures_of_metric_units_are_advised_first() {
     let mixed = with_nodes_times(&raw_fixture("bracket_hex20"), 1e-3);
-    let unstated = RawModel { units: UnitSystem::default(), ..mixed.clone() };
+    let unstated = mixed.clone().with(|data| data.description.units = UnitSystem::default());
     for raw in [&mixed, &unstated, &in_units(&mixed, ["m", "kg", "s"]), &in_units(&mixed, ["cm", "kg", "s"])]
     {
         let help = implausible(raw).help().to_owned();
@@ -424,7 +424,9 @@ fn other_units_in_which_metric_numbers_are_no_metal_are_confirmed() {
             let raw = with_mass_times(&raw, 1.0 / kilogram / mass);
             let raw = in_units(&with_stiffness_times(&raw, 1.0 / kilogram / mass), units);
             assert_eq!(told(raw.clone()), [], "{name} in {units:?}");
-            let help = implausible(&RawModel { units: UnitSystem::default(), ..raw }).help().to_owned();
+            let help = implausible(&raw.with(|data| data.description.units = UnitSystem::default()))
+                .help()
+                .to_owned();
             assert!(help.contains(&format!("materials in {};", units.join(", "))), "{help}");
         }
     }
@@ -496,9 +498,9 @@ fn exchanged_matrices_are_named_as_such() {
 fn a_reference_point_far_from_its_nodes_is_told() {
     let raw = raw_fixture("bracket_hex20");
     let with = |reference| {
-        let nodes = raw.interfaces[0].nodes.clone();
+        let nodes = raw.data.interfaces[0].nodes.clone();
         let set = NodeSet { coupling: Some(Coupling::Rigid), reference, ..NodeSet::new("bolt", nodes) };
-        told(RawModel { interfaces: vec![set], ..raw.clone() })
+        told(raw.clone().with(|data| data.interfaces = vec![set]))
     };
     assert_eq!(with(Reference::Centre), []);
     assert_eq!(with(Reference::Point([300.0, 0.0, 0.0])), [Code::InterfaceFar]);

@@ -110,7 +110,7 @@ fn rows_of_rotated_nodes_are_turned_by_their_angles() {
         );
         fs::write(&manifest, text).expect("written");
         let own = read_model(&read_manifest(&manifest).expect("a manifest")).expect("a model");
-        let Some(flexbody_model::Damping::Matrix(damping)) = &own.damping else { panic!("damping") };
+        let Some(flexbody_model::Damping::Matrix(damping)) = &own.data.damping else { panic!("damping") };
         for (matrix, expected, scale) in [
             (&own.stiffness, &raw.stiffness, 1.0),
             (&own.mass, &raw.mass, 1.0),

@@ -223,7 +223,7 @@ pub(crate) fn check_density(
     local: &LocalMass,
     found: &mut Vec<Diagnostic>,
 ) -> Option<f64> {
-    let units = &body.raw.units;
+    let units = &body.data.description.units;
     let Densities { quartiles, nodes } = densities?;
     let to_si = units.mass.to_si() / units.length.to_si().powi(3);
     let [lower, median, upper] = quartiles.map(|density| density * to_si);
@@ -239,7 +239,7 @@ pub(crate) fn check_density(
         units.length.name(),
         units.mass.name()
     );
-    if body.raw.allow_implausible || !body.raw.has_units() {
+    if body.origin.allow_implausible || !body.has_units() {
         found.push(Diagnostic::new(Code::InertiaImplausible, message));
         return None;
     }
@@ -421,7 +421,7 @@ pub(crate) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
         "masses of nodes of the same elements fit their stiffness only when exchanged: {}",
         name_some(&named)
     );
-    found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.raw.mass.path));
+    found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.origin.mass.path));
     pairs.len()
 }
 
@@ -434,8 +434,8 @@ pub(crate) fn check_speed(
     density: Option<f64>,
     found: &mut Vec<Diagnostic>,
 ) {
-    let units = &body.raw.units;
-    let Some(speeds) = local.sound_speed(body.rows.dimension).filter(|_| body.raw.has_units()) else {
+    let units = &body.data.description.units;
+    let Some(speeds) = local.sound_speed(body.rows.dimension).filter(|_| body.has_units()) else {
         return;
     };
     let to_si = units.length.to_si() / units.time.to_si();
@@ -456,7 +456,7 @@ pub(crate) fn check_speed(
             Some(density) => fitting_units(solid(body, density, speeds.median)).join(", or in "),
             None => units_of_speed(speeds.median).join(", or in "),
         };
-        let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
+        let unstated = !units.stated && !body.origin.allow_implausible && !fitting.is_empty();
         found.push(
             if unstated && !found.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible) {
                 Diagnostic::new(
@@ -479,7 +479,7 @@ fn metal_in_other_units(
     speed: f64,
     is_implausible: bool,
 ) -> Option<Diagnostic> {
-    let units = &body.raw.units;
+    let units = &body.data.description.units;
     let names = format!("{}, {}, {}", units.length.name(), units.mass.name(), units.time.name());
     let speed_si = speed * units.length.to_si() / units.time.to_si();
     let assumed = if units.stated { "" } else { " (assumed since no units are given)" };
@@ -504,13 +504,13 @@ fn metal_in_other_units(
         );
         (format!("{told}: the density is that of {metal}, and so is {ratio} times the speed"), help)
     };
-    let code = if body.raw.allow_implausible { Code::SpeedImplausible } else { Code::DensityImplausible };
+    let code = if body.origin.allow_implausible { Code::SpeedImplausible } else { Code::DensityImplausible };
     Some(Diagnostic::new(code, message).with_help(help))
 }
 
 /// Returns the numbers of the model for a density in kg/m^3 and a speed in the units of the model.
 fn solid(body: &Assembled, density: f64, speed: f64) -> Solid {
-    let units = &body.raw.units;
+    let units = &body.data.description.units;
     Solid { density: density * units.length.to_si().powi(3) / units.mass.to_si(), speed }
 }
 

@@ -47,10 +47,10 @@ struct Forces {
 /// Returns an error if K holds springs to ground that the digits of its values show. The rows need the motion
 /// of rows without a position.
 pub(crate) fn ground_springs(body: &Assembled) -> Option<Diagnostic> {
-    let found = Forces::new(body, body.raw.stiffness.digits)?;
+    let found = Forces::new(body, body.origin.stiffness.digits)?;
     // Values that were rounded before the file was written in full have fewer digits in these rows.
     let shown = shown_digits(body, &found);
-    let found = if shown < body.raw.stiffness.digits { Forces::new(body, shown)? } else { found };
+    let found = if shown < body.origin.stiffness.digits { Forces::new(body, shown)? } else { found };
     found.resist_translations(body.rows.dimension).then(|| found.diagnostic(body))
 }
 
@@ -133,8 +133,8 @@ impl Forces {
     }
 
     fn diagnostic(&self, body: &Assembled) -> Diagnostic {
-        let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
-        let (d, units) = (rows.dimension, &raw.units);
+        let Assembled { data, origin, nodes, rows, stiffness, mass, .. } = body;
+        let (d, units) = (rows.dimension, &data.description.units);
         let (centre, length) = centre_and_length(&nodes.positions);
         let rigid = rows.rigid_fields(&nodes.positions, centre, length);
         let inertia =
@@ -163,7 +163,7 @@ impl Forces {
             joined(&stiffness_of),
             joined(&frequency_of)
         );
-        Diagnostic::new(Code::RigidMotionStrained, message).in_file(&raw.stiffness.path).with_help(
+        Diagnostic::new(Code::RigidMotionStrained, message).in_file(&origin.stiffness.path).with_help(
             "write K without the springs to ground (mounts, soil, bungees), and give them to the multibody program as force elements at interfaces of the body",
         )
     }

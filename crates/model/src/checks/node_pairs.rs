@@ -70,7 +70,7 @@ pub(crate) fn check_mass_pairs(
     own_mass: Option<&SymmetricMatrix>,
     found: &mut Vec<Diagnostic>,
 ) -> [usize; 2] {
-    let Assembled { raw, nodes, rows, stiffness, .. } = body;
+    let Assembled { origin, nodes, rows, stiffness, .. } = body;
     let mass = own_mass.unwrap_or(&body.mass);
     let MassPairs { count, foreign } = MassPairs::new(stiffness, mass, rows);
     if foreign.is_empty() {
@@ -87,8 +87,8 @@ pub(crate) fn check_mass_pairs(
         "mass couples {count} pairs of nodes, {} of which stiffness does not couple: {some}",
         foreign.len()
     );
-    let report = |code| Diagnostic::new(code, message.as_str()).in_file(&raw.mass.path);
-    if raw.allow_implausible {
+    let report = |code| Diagnostic::new(code, message.as_str()).in_file(&origin.mass.path);
+    if origin.allow_implausible {
         found.push(report(Code::MassPairs));
     } else if let Some(order) = other_order(body) {
         found.push(report(Code::MassOrder).with_help(order));

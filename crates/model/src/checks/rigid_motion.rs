@@ -23,7 +23,7 @@ pub(crate) fn check_rigid_motion(
     limit: f64,
     found: &mut Vec<Diagnostic>,
 ) -> f64 {
-    let Assembled { raw, nodes, rows, stiffness, .. } = body;
+    let Assembled { origin, nodes, rows, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);
     let fields = rows.rigid_fields(&nodes.positions, centre, length);
     let residuals = rigid_residuals(stiffness, &fields, &rows.field_sizes(length));
@@ -58,14 +58,14 @@ pub(crate) fn check_rigid_motion(
             }
         };
         let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
-        found.push(diagnostic.in_file(&raw.stiffness.path).with_help(help));
+        found.push(diagnostic.in_file(&origin.stiffness.path).with_help(help));
     } else if ground.is_some() {
         found.extend(ground);
     } else if worst > rounded {
         let message = format!(
             "|K R| reaches {worst:.1e} of the row sum of |K|: node positions fit the stiffness to about this part of the size of the body"
         );
-        found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&raw.nodes_path));
+        found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&origin.nodes_path));
     }
     worst
 }
@@ -188,14 +188,14 @@ impl<'a> Readings<'a> {
 /// Checks that a mass that does not commute with rotations gives rigid motion the inertia of a rigid body:
 /// R'MR = \[m I, -c~; c~, I0\].
 pub(crate) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Diagnostic>) {
-    let Assembled { raw, nodes, rows, mass, stiffness, .. } = body;
+    let Assembled { origin, nodes, rows, mass, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);
     let rigid = rows.rigid_fields(&nodes.positions, centre, length);
     let d = rows.dimension;
     let g = gram(rigid.as_ref(), Pencil::new(stiffness, mass, 1).apply_mass(rigid.as_ref()).as_ref());
     let m = (0..d).map(|k| g[(k, k)]).sum::<f64>() / d as f64;
     let mut refuse = |message: String| {
-        found.push(Diagnostic::new(Code::MassDirectional, message).in_file(&raw.mass.path));
+        found.push(Diagnostic::new(Code::MassDirectional, message).in_file(&origin.mass.path));
     };
     let directional = (0..d).flat_map(|k| (0..d).map(move |l| (k, l)));
     let spread =

@@ -6,7 +6,10 @@ use crate::fe_model::assemble::{Assembled, assemble};
 use crate::named_load::{loads_of_body, refuse_loads_of_several_bodies};
 use crate::recovery::{recoveries_of_body, refuse_several_bodies};
 use crate::wording::{in_words, name_some};
-use crate::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
+use crate::{
+    BodyNumber, Damping, Description, FeModel, GeometricStiffness, ModelData, NodeSet, Nodes, RawModel, Rows,
+    rigid_count,
+};
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_linalg::SymmetricMatrix;
@@ -44,7 +47,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     let (mut checked, mut failed) = (Vec::new(), Vec::new());
     for (i, body) in bodies.into_iter().enumerate() {
         let number = BodyNumber { number: i + 1, of: count };
-        match check_body(body, Some(number), Vec::new()) {
+        match check_body(body, Vec::new()) {
             Ok(mut one) => {
                 let numbered = one.diagnostics.into_iter().map(|diagnostic| diagnostic.about(number));
                 one.diagnostics = shared.iter().cloned().chain(numbered).collect();
@@ -66,21 +69,23 @@ fn separate(whole: Assembled) -> Diagnosed<Vec<Assembled>> {
     let members = whole.rows.separated(&component);
     let mut found = Vec::new();
     found.extend(too_small(&whole, &component, &members));
-    let interfaces = distribute(&whole.raw.interfaces, &component, &whole.nodes, &mut found);
+    let interfaces = distribute(&whole.data.interfaces, &component, &whole.nodes, &mut found);
     check_couplings(&whole, &component, &mut found);
     check_loads_of_others(&whole, &component, &interfaces, &mut found);
     let body: HashMap<i64, usize> = whole.nodes.ids.iter().copied().zip(component.iter().copied()).collect();
     let of_row = |row: usize| component[whole.rows.vertex(row)];
-    refuse_loads_of_several_bodies(&whole.named_loads, of_row, &mut found);
-    refuse_several_bodies(&whole.recoveries, of_row, |id| body.get(&id).copied(), &mut found);
+    refuse_loads_of_several_bodies(&whole.data.named_loads, of_row, &mut found);
+    refuse_several_bodies(&whole.data.recoveries, of_row, |id| body.get(&id).copied(), &mut found);
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(found);
     }
     let nodes = nodes_of_bodies(&whole.nodes, &component, members.len());
+    let count = members.len();
     let parts = members.into_iter().zip(nodes.into_iter().zip(interfaces));
-    let mut bodies = Vec::with_capacity(parts.len());
+    let mut bodies = Vec::with_capacity(count);
     for (i, ((kept, rows), (nodes, interfaces))) in parts.enumerate() {
-        bodies.push(body_model(&whole, i + 1, &kept, rows, nodes, interfaces));
+        let number = BodyNumber { number: i + 1, of: count };
+        bodies.push(body_model(&whole, number, &kept, rows, nodes, interfaces));
     }
     Ok(bodies)
 }
@@ -99,16 +104,19 @@ fn too_small(whole: &Assembled, component: &[usize], members: &[(Vec<usize>, Row
             in_words(&small)
         );
         Diagnostic::new(Code::ModelTooSmall, message)
-            .in_file(&whole.raw.stiffness.path)
+            .in_file(&whole.origin.stiffness.path)
             .with_help("connect these nodes, or remove them from the matrices")
     })
 }
 
 /// Adds errors about damping and geometric stiffness that couple bodies.
 fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagnostic>) {
-    let damping = whole.damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
-    let geometric =
-        whole.geometric_stiffness.iter().map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
+    let damping = whole.data.damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
+    let geometric = whole
+        .data
+        .geometric_stiffness
+        .iter()
+        .map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
     for (matrix, name) in damping.into_iter().chain(geometric) {
         found.extend(coupling(matrix, &name, component, &whole.rows, &whole.nodes));
     }
@@ -122,9 +130,9 @@ fn check_loads_of_others(
     interfaces: &[Vec<NodeSet>],
     found: &mut Vec<Diagnostic>,
 ) {
-    let Assembled { nodes, rows, geometric_stiffness, .. } = whole;
+    let Assembled { data, nodes, rows, .. } = whole;
     let body_of = |row: usize| component[rows.vertex(row)];
-    for GeometricStiffness { load, matrix } in geometric_stiffness {
+    for GeometricStiffness { load, matrix } in &data.geometric_stiffness {
         let at = load.kind.interface();
         let body_of_load =
             interfaces.iter().position(|sets| sets.iter().any(|set| at == Some(set.name.as_str())));
@@ -152,40 +160,47 @@ fn nodes_of_bodies(nodes: &Nodes, component: &[usize], bodies: usize) -> Vec<Nod
 /// Returns the body with this number, made of the rows `kept`.
 fn body_model(
     whole: &Assembled,
-    number: usize,
+    number: BodyNumber,
     kept: &[usize],
     rows: Rows,
     nodes: Nodes,
     interfaces: Vec<NodeSet>,
 ) -> Assembled {
-    let damping = whole.damping.as_ref().map(|damping| {
+    let all = &whole.data;
+    let damping = all.damping.as_ref().map(|damping| {
         let principal = |matrix: &SymmetricMatrix| Ok::<_, Infallible>(matrix.principal(kept));
         let Ok(restricted) = damping.borrowed().try_map(principal);
         restricted
     });
     // Drop loads that have no entries in rows of this body.
-    let geometric_stiffness = whole
+    let geometric_stiffness = all
         .geometric_stiffness
         .iter()
         .map(|one| GeometricStiffness { load: one.load.clone(), matrix: one.matrix.principal(kept) })
         .filter(|one| one.matrix.as_csc().nnz() > 0)
         .collect();
-    let name = format!("{}-{number}", whole.raw.name);
-    let recoveries = recoveries_of_body(&whole.recoveries, kept, &nodes);
+    let name = format!("{}-{}", all.description.name, number.number);
+    let data = ModelData {
+        description: Description { name, number: Some(number), ..all.description.clone() },
+        interfaces,
+        mesh: all.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
+        damping,
+        geometric_stiffness,
+        recoveries: recoveries_of_body(&all.recoveries, kept, &nodes),
+        named_loads: loads_of_body(&all.named_loads, kept),
+        sources: all.sources.clone(),
+    };
     Assembled {
-        recoveries,
-        named_loads: loads_of_body(&whole.named_loads, kept),
-        raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_body(), ..whole.raw.clone() },
-        mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
+        data,
+        origin: whole.origin.clone(),
         nodes,
         rows,
+        given_rows: whole.given_rows.of_body(),
         stiffness: whole.stiffness.principal(kept),
         mass: whole.mass.principal(kept),
         soft: whole.soft.of_body(kept),
         followers: whole.followers.as_ref().map(|followers| followers.of_body(kept)),
         row_to_internal: None,
-        damping,
-        geometric_stiffness,
     }
 }
 

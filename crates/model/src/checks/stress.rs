@@ -1,10 +1,11 @@
 //! Check of geometric stiffness by its behaviour under rigid motion (theory section 7).
 
 use crate::checks::stress_loads::UnitLoads;
+use crate::fe_model::origin::MatrixOrigin;
 use crate::rounding::rounding;
 use crate::rows::{centre_and_length, rigid_axes};
 use crate::wording::name_some;
-use crate::{FeModel, GeometricStiffness, RawMatrix, UnitLoad};
+use crate::{FeModel, GeometricStiffness, UnitLoad};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::ties::first_largest;
@@ -27,12 +28,12 @@ const MIN_REPORTED_LOAD_ERROR: f64 = 1e-5;
 /// Adds an error for each geometric stiffness that breaks a relation with rigid motion, or that belongs to
 /// another load.
 ///
-/// * `files`: matrices as read, with their files.
+/// * `files`: files of the matrices.
 /// * `solid`: true if all elements of the body are known to be solids, so that K_geo is a multiple of I for
 ///   every pair of nodes.
 pub(crate) fn check_stress(
     model: &FeModel,
-    files: &[GeometricStiffness<RawMatrix>],
+    files: &[GeometricStiffness<MatrixOrigin>],
     solid: bool,
     found: &mut Vec<Diagnostic>,
 ) {

@@ -4,6 +4,7 @@
 use crate::directors::followers::GivenFollowers;
 use crate::fe_model::drilling::{Following, with_following_rotations};
 use crate::fe_model::layout::{Layout, layout};
+use crate::fe_model::origin::Origin;
 use crate::fe_model::references::resolve_references;
 use crate::geometric_stiffness::check_loads;
 use crate::named_load::checked_loads;
@@ -12,7 +13,7 @@ use crate::rounding::rounding;
 use crate::rows::{extents, rigid_count};
 use crate::wording::name_some;
 use crate::{
-    Damping, DofLabel, GeometricStiffness, ModelLoad, ModelRecovery, Nodes, RawMatrix, RawModel, Rows,
+    Damping, DofLabel, GeometricStiffness, GivenRows, ModelData, Nodes, RawMatrix, RawModel, Rows,
     SoftRotations, SurfaceMesh,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -42,14 +43,7 @@ pub(crate) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let mut order = InternalOrder { layout: &layout, nodes: &nodes, found: &mut found };
     let stiffness = order.symmetric(&mut raw.stiffness, "stiffness");
     let mass = order.symmetric(&mut raw.mass, "mass");
-    let damping = raw.damping.take().and_then(|damping| order.damping(damping));
-    let geometric_stiffness = order.geometric_stiffness(&mut raw.geometric_stiffness);
-    let matrix_rows = layout.row_to_internal.len();
-    let of_files = RowsOfFiles { given: &raw.given_rows, matrix_rows, to: &layout.row_to_internal };
-    let asked = std::mem::take(&mut raw.recoveries);
-    let recoveries = checked_recoveries(asked, &of_files, &nodes, &mut found);
-    let given = std::mem::take(&mut raw.named_loads);
-    let named_loads = checked_loads(given, &of_files, &raw.interfaces, &layout.rows, &mut found);
+    let data = order.data(&mut raw.data, &raw.given_rows, mesh);
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -60,6 +54,7 @@ pub(crate) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     found.extend(check_magnitudes(&stiffness, &mass, &nodes, &raw));
     stop_on_error(&mut found)?;
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
+    let given_rows = std::mem::take(&mut raw.given_rows);
     let followers = raw.followers.take().map(|raw| {
         let to_internal = layout.row_to_internal.clone();
         GivenFollowers { raw: Arc::new(raw), to_internal }
@@ -74,19 +69,16 @@ pub(crate) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     #[cfg(debug_assertions)]
     let [stiffness, mass] = crate::test_rounding::rounded([stiffness, mass]);
     let body = Assembled {
-        raw,
+        data,
+        origin: Origin::from(raw),
         nodes,
-        mesh,
         rows,
+        given_rows,
         stiffness,
         mass,
         soft,
         followers,
         row_to_internal,
-        damping,
-        geometric_stiffness,
-        recoveries,
-        named_loads,
     };
     Ok((body, found))
 }
@@ -104,11 +96,11 @@ fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
         let message = format!("`dimension` is {}, expected 2 or 3", raw.dimension);
         found.push(Diagnostic::new(Code::ManifestSyntax, message));
     }
-    if let Some(problem) = raw.damping.as_ref().and_then(Damping::problem) {
+    if let Some(problem) = raw.data.damping.as_ref().and_then(Damping::problem) {
         found.push(Diagnostic::new(Code::ManifestSyntax, problem));
     }
-    let damping = raw.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
-    let geometric = raw.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC_STIFFNESS));
+    let damping = raw.data.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
+    let geometric = raw.data.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC_STIFFNESS));
     for (other, name) in damping.into_iter().chain(geometric) {
         check_matrix(other, name, found);
         let rows = other.matrix.n_cols();
@@ -127,7 +119,7 @@ fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
     resolve_references(raw, nodes, found);
     check_members(raw, nodes, found);
     let dimension = usize::from(raw.dimension);
-    check_loads(&raw.geometric_stiffness, &raw.interfaces, dimension, found);
+    check_loads(&raw.data.geometric_stiffness, &raw.data.interfaces, dimension, found);
     let rows = raw.stiffness.matrix.n_cols();
     if rows <= rigid_count(dimension) {
         let message = format!("model has {rows} degrees of freedom");
@@ -138,7 +130,7 @@ fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
 /// Returns the surface on the `nodes` that have rows; adds a diagnostic about triangles that are lost with
 /// other nodes, since they leave holes.
 fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) -> Option<SurfaceMesh> {
-    let mesh = raw.mesh.take()?;
+    let mesh = raw.data.mesh.take()?;
     if mesh.least_nodes() > raw.nodes.len() {
         let message = format!("mesh has {} nodes, the node table {}", mesh.least_nodes(), raw.nodes.len());
         found.push(Diagnostic::new(Code::MeshForeign, message));
@@ -173,7 +165,7 @@ fn check_places(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
 fn check_members(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     let placed: HashSet<i64> = raw.nodes.ids.iter().copied().collect();
-    for set in &raw.interfaces {
+    for set in &raw.data.interfaces {
         let others = set.nodes.iter().filter(|id| !known.contains(id)).copied();
         let (at_rest, unknown): (Vec<i64>, Vec<i64>) = others.partition(|id| placed.contains(id));
         for (members, what) in [(unknown, "unknown nodes"), (at_rest, "nodes without stiffness and mass")] {
@@ -195,6 +187,35 @@ struct InternalOrder<'o> {
 }
 
 impl InternalOrder<'_> {
+    /// Converts the data of a model, with its surface on the nodes that have rows. The loads, files and digits of
+    /// geometric stiffness stay in `given`.
+    fn data(
+        &mut self,
+        given: &mut ModelData<RawMatrix>,
+        given_rows: &GivenRows,
+        mesh: Option<SurfaceMesh>,
+    ) -> ModelData<SymmetricMatrix> {
+        let damping = given.damping.take().and_then(|damping| self.damping(damping));
+        let geometric_stiffness = self.geometric_stiffness(&mut given.geometric_stiffness);
+        let to = &self.layout.row_to_internal;
+        let of_files = RowsOfFiles { given: given_rows, matrix_rows: to.len(), to };
+        let asked = std::mem::take(&mut given.recoveries);
+        let recoveries = checked_recoveries(asked, &of_files, self.nodes, self.found);
+        let loads = std::mem::take(&mut given.named_loads);
+        let interfaces = std::mem::take(&mut given.interfaces);
+        let named_loads = checked_loads(loads, &of_files, &interfaces, &self.layout.rows, self.found);
+        ModelData {
+            description: std::mem::take(&mut given.description),
+            interfaces,
+            mesh,
+            damping,
+            geometric_stiffness,
+            recoveries,
+            named_loads,
+            sources: std::mem::take(&mut given.sources),
+        }
+    }
+
     /// Takes a matrix out of `raw` and returns it; `None` with a diagnostic if it is not symmetric.
     fn symmetric(&mut self, raw: &mut RawMatrix, name: &str) -> Option<SymmetricMatrix> {
         let (layout, nodes) = (self.layout, self.nodes);
@@ -230,7 +251,7 @@ impl InternalOrder<'_> {
 /// Checks for names that no file can hold, before a long run instead of after it.
 fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
     let mut seen = HashSet::new();
-    for set in &raw.interfaces {
+    for set in &raw.data.interfaces {
         let name = &set.name;
         let wrong = match name.as_str() {
             "" => Some("an interface has no name".to_owned()),
@@ -244,8 +265,9 @@ fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
         };
         found.extend(wrong.map(|message| Diagnostic::new(Code::ManifestSyntax, message)));
     }
-    if raw.name.contains('\0') {
-        found.push(Diagnostic::new(Code::ManifestSyntax, "the model name has a NUL character in it"));
+    for (field, _) in raw.data.description.texts().iter().filter(|(_, text)| text.contains('\0')) {
+        let message = format!("the model {field} has a NUL character in it");
+        found.push(Diagnostic::new(Code::ManifestSyntax, message));
     }
 }
 
@@ -431,14 +453,16 @@ fn check_magnitudes(
 
 /// Model in the internal order whose matrices are valid by themselves.
 pub(crate) struct Assembled {
-    /// Model as read, without matrices, nodes, surface and labels.
-    pub raw: RawModel,
+    /// Data in the internal order; the surface is on `nodes`.
+    pub data: ModelData<SymmetricMatrix>,
+    /// Files, for messages and tolerances.
+    pub origin: Origin,
     /// Nodes with degrees of freedom.
     pub nodes: Nodes,
-    /// Surface on these nodes.
-    pub mesh: Option<SurfaceMesh>,
     /// Meaning of the rows; the motion of rows without a position is not known yet.
     pub rows: Rows,
+    /// Maps for shapes and loads from the rows of the files to the rows of K and M as read.
+    pub given_rows: GivenRows,
     /// K.
     pub stiffness: SymmetricMatrix,
     /// M.
@@ -450,12 +474,13 @@ pub(crate) struct Assembled {
     /// Internal row of each matrix row, `u32::MAX` for rows that are left out; `None` if the orders are
     /// equal, or for one of several bodies.
     pub row_to_internal: Option<Vec<u32>>,
-    /// Damping; a matrix is in the internal order.
-    pub damping: Option<Damping<SymmetricMatrix>>,
-    /// Geometric stiffness, in the internal order.
-    pub geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
-    /// Rows to read off the body, in the internal order.
-    pub recoveries: Vec<ModelRecovery>,
-    /// Nodal forces with a name, in the internal order.
-    pub named_loads: Vec<ModelLoad>,
+}
+
+impl Assembled {
+    /// Returns true if the numbers can be compared with real materials: units are stated, or the model
+    /// comes from files, whose numbers default to m, kg, s. Matrices in memory without units may be
+    /// dimensionless.
+    pub(crate) fn has_units(&self) -> bool {
+        self.data.description.units.stated || !self.origin.stiffness.path.as_os_str().is_empty()
+    }
 }

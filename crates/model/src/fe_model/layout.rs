@@ -178,8 +178,8 @@ impl RowsOfNodes {
     /// for those about the normal of a shell: there the node has other rotations and an element around it. A
     /// displacement without stiffness and mass is kept if the node has other displacements: it is an error.
     fn leave_out_empty(&mut self, raw: &RawModel) -> LeftOut {
-        let others = raw.damping.as_ref().and_then(Damping::matrix).into_iter();
-        let others = others.chain(raw.geometric_stiffness.iter().map(|one| &one.matrix));
+        let others = raw.data.damping.as_ref().and_then(Damping::matrix).into_iter();
+        let others = others.chain(raw.data.geometric_stiffness.iter().map(|one| &one.matrix));
         let matrices = [&raw.stiffness, &raw.mass].into_iter().chain(others).map(|one| &one.matrix);
         let filled = filled_rows(matrices, raw.stiffness.matrix.n_cols());
         let mut left_out = LeftOut::default();

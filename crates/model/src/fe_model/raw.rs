@@ -1,13 +1,10 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
 use crate::raw_matrix::RawMatrix;
-use crate::{
-    Damping, DofLabel, GeometricStiffness, GivenRows, ModelLoad, ModelRecovery, NodeSet, Nodes, RawFollowers,
-    SurfaceMesh,
-};
+use crate::{Description, DofLabel, GivenRows, ModelData, Nodes, RawFollowers};
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
-use flexbody_base::provenance::{SourceFile, Sources};
+use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
 use std::path::PathBuf;
@@ -49,12 +46,10 @@ pub struct RawModes {
 /// Complete description of one model before the checks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawModel {
-    /// Name of the model.
-    pub name: String,
+    /// Data other than matrices, nodes and rows.
+    pub data: ModelData<RawMatrix>,
     /// Dimension, 3 or 2.
     pub dimension: u8,
-    /// Units of the numbers.
-    pub units: UnitSystem,
     /// Stiffness matrix K.
     pub stiffness: RawMatrix,
     /// Mass matrix M.
@@ -63,8 +58,6 @@ pub struct RawModel {
     pub nodes: Nodes,
     /// Path of the file of the node table; empty for data in memory.
     pub nodes_path: PathBuf,
-    /// Surface, by indices of `nodes`, if elements are known.
-    pub mesh: Option<SurfaceMesh>,
     /// Label of each matrix row; `None`: node-major x, y, z in the order of the node table.
     pub dofs: Option<Vec<DofLabel>>,
     /// Path of the file of the labels; empty for data in memory.
@@ -73,64 +66,42 @@ pub struct RawModel {
     pub given_rows: GivenRows,
     /// Points with mass that follow several nodes by constraints which the reader eliminated.
     pub followers: Option<RawFollowers>,
-    /// Named node sets.
-    pub interfaces: Vec<NodeSet>,
-    /// Damping, if given; a matrix has the rows of K and M.
-    pub damping: Option<Damping<RawMatrix>>,
-    /// Geometric stiffness of unit loads, with the rows of K and M.
-    pub geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>,
-    /// Rows to read off the body; the operators have the rows of the files.
-    pub recoveries: Vec<ModelRecovery>,
-    /// Nodal forces with a name, by the rows of the files.
-    pub named_loads: Vec<ModelLoad>,
     /// True if findings that the user has accepted are warnings instead of errors: implausible densities,
     /// and mass coupling without stiffness.
     pub allow_implausible: bool,
     /// True if soft rotations, to which only elements that are not quite coplanar give a stiffness, stay as K
     /// has them instead of following their elements.
     pub keep_soft_rotations: bool,
-    /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`, `manifest`), file name
-    /// and SHA-256 (hex) of every file read.
-    pub sources: Sources,
     /// Warnings and notes of the readers; no errors.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl RawModel {
-    /// Returns true if the numbers can be compared with real materials: units are stated, or the model
-    /// comes from files, whose numbers default to m, kg, s. Matrices in memory without units may be
-    /// dimensionless.
-    pub fn has_units(&self) -> bool {
-        self.units.stated || !self.stiffness.path.as_os_str().is_empty()
-    }
-
     /// Creates a model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all
     /// digits valid, units m, kg, s not stated. Set the fields for further data. `examples/from_memory.rs`
     /// continues from here to a written file.
     pub fn in_memory(name: impl Into<String>, stiffness: CscMatrix, mass: CscMatrix, nodes: Nodes) -> Self {
         let matrix = |matrix| RawMatrix { matrix, digits: 17, path: PathBuf::new() };
         Self {
-            name: name.into(),
+            data: ModelData::new(Description::new(name, UnitSystem::default())),
             dimension: 3,
-            units: UnitSystem::default(),
             stiffness: matrix(stiffness),
             mass: matrix(mass),
             nodes,
             nodes_path: PathBuf::new(),
-            mesh: None,
             dofs: None,
             dofs_path: PathBuf::new(),
             given_rows: GivenRows::default(),
             followers: None,
-            interfaces: Vec::new(),
-            damping: None,
-            geometric_stiffness: Vec::new(),
-            recoveries: Vec::new(),
-            named_loads: Vec::new(),
             allow_implausible: false,
             keep_soft_rotations: false,
-            sources: Sources::default(),
             diagnostics: Vec::new(),
         }
+    }
+
+    /// Returns the model with its data changed by `change`, which is called once.
+    pub fn with(mut self, change: impl FnOnce(&mut ModelData<RawMatrix>)) -> Self {
+        change(&mut self.data);
+        self
     }
 }

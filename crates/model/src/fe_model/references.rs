@@ -30,7 +30,7 @@ pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
     let body = Extent { centre, size };
     let index: HashMap<i64, u32> = raw.nodes.ids.iter().copied().zip(0..).collect();
     let positions = &raw.nodes.positions;
-    for set in &mut raw.interfaces {
+    for set in &mut raw.data.interfaces {
         let is_free = set.coupling == Some(Coupling::Free);
         if is_free && set.reference.is_stated() {
             let message = format!("interface `{}` is free, but has a reference point", set.name);
@@ -52,7 +52,7 @@ pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 outline.sort_unstable();
                 outline.dedup();
                 let members = InterfaceNodes { nodes: &nodes, outline: &outline, positions };
-                let centre = InterfaceCentre::new(&members, raw.mesh.as_ref(), &set.reference);
+                let centre = InterfaceCentre::new(&members, raw.data.mesh.as_ref(), &set.reference);
                 found.extend(beside_the_mean(&set.name, &centre, &member_positions, body.size));
                 set.reference = Reference::Default(centre.point);
             }

@@ -14,14 +14,14 @@ const SIX: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 fn model() -> RawModel {
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([2, 1, 1]), |[x, y, z]| [x, y + 0.1 * x, z]);
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    RawModel { recoveries: vec![mesh.stresses(&Material::STEEL)], ..raw }
+    raw.with(|data| data.recoveries = vec![mesh.stresses(&Material::STEEL)])
 }
 
 /// Returns the number of points and the messages of a model whose components have other names; an empty name leaves the row out as a
 /// stress.
 fn told(components: [&str; 6]) -> (usize, Vec<(Code, String)>) {
     let mut raw = model();
-    let RecoveryOperator::Rows { labels, .. } = &mut raw.recoveries[0].operator else { panic!("rows") };
+    let RecoveryOperator::Rows { labels, .. } = &mut raw.data.recoveries[0].operator else { panic!("rows") };
     for (at, label) in labels.iter_mut().enumerate() {
         let new = components[at % 6];
         label.name = label.name.replace(SIX[at % 6], new);
@@ -56,7 +56,7 @@ fn usual_spellings_of_the_components_are_points() {
 fn stresses_of_shapes_in_another_unit_are_reported() {
     let said = |factor: f64| {
         let mut raw = model();
-        raw.units = UnitSystem::parse("mm", "t", "s").expect("units");
+        raw.data.description.units = UnitSystem::parse("mm", "t", "s").expect("units");
         let scaled = |matrix: &CscMatrix, factor: f64| {
             let all: Vec<_> = entries(matrix).map(|(r, c, v)| (r, c, factor * v)).collect();
             CscMatrix::from_triplets(matrix.n_rows(), matrix.n_cols(), &all)
@@ -65,7 +65,7 @@ fn stresses_of_shapes_in_another_unit_are_reported() {
         raw.stiffness.matrix = scaled(&raw.stiffness.matrix, 1e-3);
         raw.mass.matrix = scaled(&raw.mass.matrix, 1e-3);
         raw.nodes.positions.iter_mut().flatten().for_each(|x| *x *= 1e3);
-        let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+        let RecoveryOperator::Rows { transposed, labels, .. } = &raw.data.recoveries[0].operator else {
             panic!("rows")
         };
         let (n, rows) = (transposed.n_rows(), transposed.n_cols());
@@ -80,7 +80,7 @@ fn stresses_of_shapes_in_another_unit_are_reported() {
             answer_digits: 15,
             energies: None,
         };
-        raw.recoveries[0].operator = RecoveryOperator::Shapes { shapes, labels };
+        raw.data.recoveries[0].operator = RecoveryOperator::Shapes { shapes, labels };
         let diagnostics = FeModel::from_raw(raw).expect("a sound model").diagnostics;
         diagnostics.iter().find(|one| one.code() == Code::RecoveryScale).map(|one| one.message().to_owned())
     };

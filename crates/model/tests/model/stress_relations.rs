@@ -94,7 +94,7 @@ impl Body {
     fn told(&self, kind: LoadKind, component: usize, matrix: &DMatrix<f64>) -> (Vec<Code>, String) {
         let matrix = RawMatrix { matrix: sparse(matrix), digits: 17, path: PathBuf::from("Kg.mtx") };
         let given = GeometricStiffness { load: UnitLoad { kind, component }, matrix };
-        told(RawModel { geometric_stiffness: vec![given], ..self.raw.clone() })
+        told(self.raw.clone().with(|data| data.geometric_stiffness = vec![given]))
     }
 }
 
@@ -124,7 +124,7 @@ fn solid(is_held: bool) -> (Mesh, Body) {
     let mut order: Vec<usize> = (0..mesh.nodes.len()).collect();
     order.sort_by(|&a, &b| line(a).dot(&along).total_cmp(&line(b).dot(&along)));
     let ids = |nodes: &[usize]| nodes.iter().map(|&i| i as i64 + 1).collect::<Vec<_>>();
-    raw.interfaces = vec![NodeSet::new("tip", ids(&order[order.len() - 9..]))];
+    raw.data.interfaces = vec![NodeSet::new("tip", ids(&order[order.len() - 9..]))];
     let body = Body::new(raw, 3, if is_held { &order[..9] } else { &[] });
     (mesh, body)
 }
@@ -159,7 +159,7 @@ fn loads(body: &Body) -> Vec<(LoadKind, usize, DVector<f64>)> {
 
 /// Returns a force and a moment at the mean of the nodes of the tip, distributed unequally over its nodes.
 fn at_tip(body: &Body, force: Vector3<f64>, moment: Vector3<f64>) -> DVector<f64> {
-    let nodes: Vec<usize> = body.raw.interfaces[0].nodes.iter().map(|&id| id as usize - 1).collect();
+    let nodes: Vec<usize> = body.raw.data.interfaces[0].nodes.iter().map(|&id| id as usize - 1).collect();
     let place = |i: usize| Vector3::from(body.raw.nodes.positions[i]);
     let mean = nodes.iter().map(|&i| place(i)).sum::<Vector3<f64>>() / nodes.len() as f64;
     let mut wrench = SMatrix::<f64, 6, 1>::zeros();
@@ -391,7 +391,7 @@ fn a_stress_with_small_errors_is_taken_with_a_warning() {
 /// Returns a chain of beams with six rows per node, held at its first node or free.
 fn beams(places: &[[f64; 3]], is_held: bool) -> Body {
     let mut raw = chain("beams", places);
-    raw.interfaces = vec![NodeSet::new("tip", vec![places.len() as i64])];
+    raw.data.interfaces = vec![NodeSet::new("tip", vec![places.len() as i64])];
     Body::new(raw, 6, if is_held { &[0] } else { &[] })
 }
 
@@ -506,11 +506,11 @@ fn plane_bodies_are_held_to_the_relations_of_the_plane() {
         }
         all
     };
-    let raw = RawModel { interfaces: vec![NodeSet::new("end", vec![n as i64])], ..raw };
+    let raw = raw.with(|data| data.interfaces = vec![NodeSet::new("end", vec![n as i64])]);
     let told_of = |kind: LoadKind, component: usize, matrix: &DMatrix<f64>| {
         let matrix = RawMatrix { matrix: sparse(matrix), ..raw.stiffness.clone() };
         let given = GeometricStiffness { load: UnitLoad { kind, component }, matrix };
-        told(RawModel { geometric_stiffness: vec![given], ..raw.clone() })
+        told(raw.clone().with(|data| data.geometric_stiffness = vec![given]))
     };
     let named = || LoadKind::Named("string".to_owned());
     for across in [false, true] {

@@ -15,8 +15,8 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 
 
 fn steel(mesh: &Mesh) -> RawModel {
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.units = UnitSystem::parse("m", "kg", "s").expect("units");
-    raw.recoveries = vec![mesh.stresses(&Material::STEEL)];
+    raw.data.description.units = UnitSystem::parse("m", "kg", "s").expect("units");
+    raw.data.recoveries = vec![mesh.stresses(&Material::STEEL)];
     raw
 }
 
@@ -30,7 +30,9 @@ fn bracket(kind: ElementKind) -> Mesh {
 
 /// Returns the model with the six rows of each point replaced by `map` times them.
 fn mapped(mut raw: RawModel, map: &Matrix6<f64>) -> RawModel {
-    let RecoveryOperator::Rows { transposed, .. } = &mut raw.recoveries[0].operator else { panic!("rows") };
+    let RecoveryOperator::Rows { transposed, .. } = &mut raw.data.recoveries[0].operator else {
+        panic!("rows")
+    };
     let place = |(row, column, value): (u32, u32, f64)| {
         let (point, component) = (column / 6, column as usize % 6);
         (0..6).map(move |k| (row, 6 * point + k as u32, map[(k, component)] * value))
@@ -95,9 +97,11 @@ fn right_stresses_pass_in_every_element_place_and_unit() {
             ..Material::STEEL
         };
         let mut raw = mesh.assemble(&material, MassRule::Consistent).raw_model();
-        raw.units = UnitSystem::parse("mm", "t", "s").expect("units");
-        raw.recoveries = vec![mesh.stresses(&material)];
-        let RecoveryOperator::Rows { labels, .. } = &mut raw.recoveries[0].operator else { panic!("rows") };
+        raw.data.description.units = UnitSystem::parse("mm", "t", "s").expect("units");
+        raw.data.recoveries = vec![mesh.stresses(&material)];
+        let RecoveryOperator::Rows { labels, .. } = &mut raw.data.recoveries[0].operator else {
+            panic!("rows")
+        };
         labels.iter_mut().for_each(|label| "MPa".clone_into(&mut label.unit));
         assert!(said(raw).is_empty(), "{kind:?} in mm");
     }
@@ -129,7 +133,9 @@ fn wrong_stresses_are_refused_with_the_components_that_differ() {
     // Another unit than the rows say; an unknown one cannot be compared.
     let in_unit = |unit: &str| {
         let mut raw = steel(&bracket(ElementKind::Hex8));
-        let RecoveryOperator::Rows { labels, .. } = &mut raw.recoveries[0].operator else { panic!("rows") };
+        let RecoveryOperator::Rows { labels, .. } = &mut raw.data.recoveries[0].operator else {
+            panic!("rows")
+        };
         labels.iter_mut().for_each(|label| unit.clone_into(&mut label.unit));
         raw
     };
@@ -167,9 +173,9 @@ fn points_of_several_materials_are_compared_each_for_itself() {
     let parts = [(mesh.part(|x| x[0] < middle), &Material::STEEL), (mesh.part(|x| x[0] >= middle), &soft)];
     let [first, second] = parts.clone().map(|(part, material)| part.assemble(material, MassRule::Consistent));
     let mut raw = first.plus(&second).raw_model();
-    raw.units = UnitSystem::parse("m", "kg", "s").expect("units");
+    raw.data.description.units = UnitSystem::parse("m", "kg", "s").expect("units");
     for (part, material) in &parts {
-        raw.recoveries = vec![part.stresses(material)];
+        raw.data.recoveries = vec![part.stresses(material)];
         assert!(said(raw.clone()).is_empty(), "{:?}", said(raw));
         for (map, facts) in [
             (scaled(3..6, 2.0), "`xy` is 2 xy, `yz` is 2 yz, `xz` is 2 xz"),

@@ -150,7 +150,7 @@ impl<'r> Recorder<'r> {
         Self {
             recording: Recording {
                 scene: scene.name.clone(),
-                body: body.source().name.clone(),
+                body: body.description().name.clone(),
                 scheme: run.scheme,
                 time: Vec::with_capacity(instants),
                 states: Vec::with_capacity(instants),

@@ -18,7 +18,7 @@ fn beam(modes: usize) -> FlexBody {
     let mut raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
     let at_root = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, x)| x[0] == 0.0);
     let nodes = at_root.map(|(id, _)| *id).collect();
-    raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new("root", nodes) }];
+    raw.data.interfaces = vec![NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new("root", nodes) }];
     let settings = ConvertSettings {
         basis: BasisChoice::CraigBampton(CraigBampton),
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },

@@ -60,7 +60,7 @@ impl Bar {
             let near = |x: &[f64; 3]| (x[0] - start).abs() < 0.05;
             (1..).zip(&mesh.nodes).filter(|(_, x)| near(x)).map(|(id, _)| id).collect()
         };
-        raw.interfaces = [("root", 0), ("tip", 3)]
+        raw.data.interfaces = [("root", 0), ("tip", 3)]
             .map(|(name, first)| NodeSet {
                 coupling: Some(Coupling::Averaging),
                 ..NodeSet::new(name, layer(first))
@@ -70,7 +70,7 @@ impl Bar {
         let loads = |name: &str| {
             converted_matrix(&interface_loads(&model, name).expect("loads").expect("a reference point"))
         };
-        let set = raw.interfaces.iter().find(|set| set.name == "root").expect("an interface");
+        let set = raw.data.interfaces.iter().find(|set| set.name == "root").expect("an interface");
         let sum: Vector3<f64> = set.nodes.iter().map(|&id| Vector3::from(mesh.nodes[id as usize - 1])).sum();
         let origin = sum / set.nodes.len() as f64;
         let (root, tip) = (loads("root"), loads("tip"));
@@ -139,7 +139,10 @@ impl Bar {
             preload: false,
             path: PathBuf::new(),
         };
-        RawModel { geometric_stiffness: all, named_loads: vec![bolts], ..self.raw.clone() }
+        self.raw.clone().with(|data| {
+            data.geometric_stiffness = all;
+            data.named_loads = vec![bolts];
+        })
     }
 
     /// Returns the forces of a named load with a resultant force and moment.

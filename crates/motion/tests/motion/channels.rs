@@ -19,13 +19,13 @@ const MODES: usize = 6;
 fn model() -> RawModel {
     let mut raw = arm_model();
     let column = |first: i64| (0..6).map(|row| first + 7 * row).collect();
-    raw.interfaces = vec![NodeSet::new("root", column(1)), NodeSet::new("free tip", column(7))];
-    for recovery in &mut raw.recoveries {
+    raw.data.interfaces = vec![NodeSet::new("root", column(1)), NodeSet::new("free tip", column(7))];
+    for recovery in &mut raw.data.recoveries {
         if let RecoveryOperator::Rows { labels, offset, .. } = &mut recovery.operator {
             *offset = Some((0..labels.len()).map(|row| 0.01 * (row as f64).sin()).collect());
         }
     }
-    raw.named_loads = named_loads(&raw);
+    raw.data.named_loads = named_loads(&raw);
     raw
 }
 

@@ -25,7 +25,7 @@ fn bracket() -> FlexBody {
         NodeSet { coupling: Some(Coupling::Averaging), reference, ..NodeSet::new(name, nodes) }
     };
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.interfaces =
+    raw.data.interfaces =
         vec![set("first", 0, Reference::Centre), set("second", 2, Reference::Point([0.1, 0.05, 0.3]))];
     body_of(raw, 8, BodyFrame::Principal)
 }
@@ -34,7 +34,8 @@ fn bracket() -> FlexBody {
 fn strip() -> FlexBody {
     let mut raw = rectangle(8, 3, 0.4, [0.3, -0.1]);
     let nodes = (1..=raw.nodes.len() as i64).step_by(9).collect();
-    raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("first", nodes) }];
+    raw.data.interfaces =
+        vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("first", nodes) }];
     body_of(raw, 6, BodyFrame::Principal)
 }
 

@@ -23,7 +23,7 @@ fn bar() -> RawModel {
     let mut raw = mesh
         .assemble(&Material { youngs: 1e7, poisson: 0.3, density: 1000.0 }, MassRule::Consistent)
         .raw_model();
-    raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("root", root) }];
+    raw.data.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("root", root) }];
     raw
 }
 
@@ -31,7 +31,7 @@ fn bar() -> RawModel {
 fn rigid_ended() -> RawModel {
     let mut raw = block(ElementKind::Hex8).raw;
     let reference = *raw.nodes.ids.last().expect("a node");
-    raw.interfaces = vec![NodeSet::new("root", vec![reference])];
+    raw.data.interfaces = vec![NodeSet::new("root", vec![reference])];
     raw
 }
 

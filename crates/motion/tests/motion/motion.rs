@@ -86,7 +86,7 @@ fn momentum_form_moves_like_velocity_form() {
         for method in [&adaptive(1e-12) as &dyn Fn(usize) -> Method, &conserving(6, step)] {
             let (places, _) = run(&equations, &EmptySpace, &start, method, &[0.0, duration], &[]);
             let apart = difference(&places[1], &expected, &start);
-            assert!(apart < 1e-9, "{}: {apart:e}", body.source().name);
+            assert!(apart < 1e-9, "{}: {apart:e}", body.description().name);
             assert!(
                 (places[1].origin - expected.origin).norm() < 1e-9 * (expected.origin - start.origin).norm()
             );
@@ -130,7 +130,7 @@ fn a_free_body_keeps_momenta_to_rounding_and_its_energy_for_a_hundred_thousand_s
         (fixture("plane_frame", 6, BodyFrame::Principal), 4, 1e-7),
         (fixture("shell_folded", 6, BodyFrame::Model), 6, 1e-9),
     ] {
-        let name = &body.source().name;
+        let name = &body.description().name;
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let start = tumbling(&body, 0.1);
         let step = 0.3 / body.modes().eigenvalue[5].sqrt();

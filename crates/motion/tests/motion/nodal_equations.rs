@@ -463,7 +463,7 @@ fn damping_matrices_act_on_the_nodes() {
         let n = raw.stiffness.matrix.n_rows();
         let lambda = converted(raw_fixture(name), 1).1.modes().eigenvalue[0];
         let (alpha, beta) = (0.2 * lambda.sqrt(), 0.01 / lambda.sqrt());
-        let rayleigh = RawModel { damping: Some(Damping::Rayleigh { alpha, beta }), ..raw };
+        let rayleigh = raw.with(|data| data.damping = Some(Damping::Rayleigh { alpha, beta }));
         assert_same_accelerations(name, &converted(rayleigh, 10_000), |_, _| {}, |_, _, _| {});
         // The damping is proportional to the diagonal of K alone.
         let raw = raw_fixture(name);
@@ -474,7 +474,7 @@ fn damping_matrices_act_on_the_nodes() {
             matrix: CscMatrix::from_triplets(n, n, &diagonal),
             ..raw.stiffness.clone()
         };
-        let damped = RawModel { damping: Some(Damping::Matrix(matrix)), ..raw };
+        let damped = raw.with(|data| data.damping = Some(Damping::Matrix(matrix)));
         assert_same_accelerations(name, &converted(damped, 10_000), |_, _| {}, |_, _, _| {});
     }
 }
@@ -551,7 +551,7 @@ fn what_has_no_nodal_equations_says_why() {
     let error = refused(&folded, &ReferenceConditions::Held(holding(&folded)));
     assert_eq!(error, NodalError::HeldMassSingular { null_vectors: 8 });
 
-    let raw = RawModel { damping: Some(Damping::Ratio(0.02)), ..soft_block(ElementKind::Hex8, [1, 1, 1]) };
+    let raw = soft_block(ElementKind::Hex8, [1, 1, 1]).with(|data| data.damping = Some(Damping::Ratio(0.02)));
     assert_eq!(refused(&model(raw), &ReferenceConditions::MeanAxes), NodalError::DampingOfModes);
 
     let equations =

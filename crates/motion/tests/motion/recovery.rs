@@ -24,7 +24,7 @@ pub fn arm_model() -> RawModel {
         [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.25 * z * (1.0 + 0.1 * y)]
     });
     let mut raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
-    raw.recoveries = vec![mesh.stresses(&rubber)];
+    raw.data.recoveries = vec![mesh.stresses(&rubber)];
     raw
 }
 
@@ -168,13 +168,13 @@ fn extremes_are_those_of_all_rows_and_instants() {
 #[test]
 fn a_carried_body_has_envelopes_and_a_free_one_no_displacements_of_another_frame() {
     let mut raw = arm_model();
-    let mut displacements = raw.recoveries[0].clone();
+    let mut displacements = raw.data.recoveries[0].clone();
     "place".clone_into(&mut displacements.name);
     if let RecoveryOperator::Rows { labels, .. } = &mut displacements.operator {
         labels.iter_mut().for_each(|label| label.quantity = Quantity::Displacement);
     }
-    raw.recoveries.push(displacements);
-    raw.interfaces = vec![NodeSet::new("root", (0..6).map(|row| 1 + 7 * row).collect())];
+    raw.data.recoveries.push(displacements);
+    raw.data.interfaces = vec![NodeSet::new("root", (0..6).map(|row| 1 + 7 * row).collect())];
     let body = body_of(raw, 6, BodyFrame::Com);
     let scene = "[run]\nduration = 0.01\n[carried]\ninterface = \"root\"\n[carried.spin]\naxis = [0, 0, 1]\nrate = 1\n";
     let folder = tempfile::tempdir().expect("a folder");

@@ -237,7 +237,7 @@ fn two_frames_describe_one_body() {
         raw_fixture("frame_beams"),
         raw_fixture("plane_frame"),
     ] {
-        let name = raw.name.clone();
+        let name = raw.data.description.name.clone();
         let (_, a) = converted(raw.clone(), 6, BodyFrame::Com);
         let (_, b) = converted(raw, 6, BodyFrame::Model);
         let moved = a
@@ -284,7 +284,7 @@ fn a_constant_velocity_changes_nothing() {
     let raws =
         names.iter().map(|name| raw_fixture(name)).chain([block(ElementKind::Hex8).raw, disc_on_shaft(2.0)]);
     for raw in raws {
-        let name = raw.name.clone();
+        let name = raw.data.description.name.clone();
         let (model, body) = converted(raw, 6, BodyFrame::Principal);
         if model.director_mass().is_none() {
             continue;
@@ -461,7 +461,7 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
 #[test]
 fn gravity_is_an_acceleration_of_the_frame() {
     for raw in [raw_fixture("shell_folded"), block(ElementKind::Hex8).raw, disc_on_shaft(2.0)] {
-        let name = raw.name.clone();
+        let name = raw.data.description.name.clone();
         let (_, body) = converted(raw, 6, BodyFrame::Model);
         let equations = EquationsOfMotion::new(&body, Terms::ALL);
         let mut evaluation = Evaluation::new(&equations);
@@ -519,7 +519,7 @@ fn a_cantilever_with_an_offset_mass_has_the_closed_form() {
         reference: Reference::Centre,
         outline: Vec::new(),
     };
-    raw.interfaces = vec![set("root", 1), set("tip", 5)];
+    raw.data.interfaces = vec![set("root", 1), set("tip", 5)];
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(2), ..ModeSettings::default() };
     let basis = BasisChoice::CraigBampton(CraigBampton);

@@ -189,7 +189,7 @@ fn differences(model: &FeModel, body: &FlexBody, scene: &Scene) -> Differences {
 #[test]
 fn watched_nodes_and_conditions_are_those_of_the_unreduced_equations() {
     let solid = |mut raw: RawModel, damping: Option<Damping<RawMatrix>>| {
-        raw.damping = damping;
+        raw.data.damping = damping;
         raw
     };
     let cases = [

@@ -377,17 +377,17 @@ fn residual(body: &FlexBody, j: usize) -> Option<f64> {
 
 impl ModelFacts {
     fn of(body: &FlexBody) -> Self {
-        let (source, units) = (body.source(), body.units());
+        let (description, source) = (body.description(), body.source());
         Self {
-            name: source.name.clone(),
+            name: description.name.clone(),
             dimension: body.dimension(),
-            body: source.number.map(|n| BodyFacts { number: n.number, of: n.of }),
+            body: description.number.map(|n| BodyFacts { number: n.number, of: n.of }),
             n_nodes: body.n_nodes(),
             n_dofs: source.n_dofs,
             mass_structure: source.mass_structure.name(),
             storage: body.storage().name(),
             approximation: source.approximation.clone(),
-            units: UnitFacts::new(units),
+            units: UnitFacts::new(&description.units),
             files: source.files.clone(),
             interfaces: body
                 .interfaces()

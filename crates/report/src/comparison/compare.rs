@@ -63,8 +63,8 @@ fn compared(
         (&in_own_a, &in_own_b)
     };
     let mut comparison = BodyComparison {
-        a: a.source().name.clone(),
-        b: b.source().name.clone(),
+        a: a.description().name.clone(),
+        b: b.description().name.clone(),
         passed: true,
         same_nodes: false,
         paired: Pairing::Order,

@@ -165,7 +165,7 @@ impl<'a> RecoveredFacts<'a> {
             format_major: 1,
             format_minor: 2,
             generator: generator(),
-            body: &body.source().name,
+            body: &body.description().name,
             history: history.path.display().to_string(),
             instants: history.time.len(),
             time_unit: body.units().time.name().to_owned(),

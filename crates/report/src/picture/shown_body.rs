@@ -76,7 +76,7 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
         let first = fields.first().filter(|_| starts_with_field);
         let marked = first.and_then(|field| field.marked(body, drawing));
         Self {
-            name: plain(&body.source().name),
+            name: plain(&body.description().name),
             generator: provenance::generator(),
             units: UnitFacts::new(body.units()),
             terms,

@@ -101,7 +101,7 @@ impl<'a> AdviceFacts<'a> {
             format_major: 1,
             format_minor: 0,
             generator: generator(),
-            body: &body.source().name,
+            body: &body.description().name,
             units: UnitFacts::new(body.units()),
             first_frequency_hz: advice.first_frequency_hz,
             spin_hz: advice.ranges.spin_hz,

@@ -148,10 +148,10 @@ type Change = (&'static str, fn(&mut Parts));
 /// Primary entries that a comparison covers, each with a change.
 const CHANGES: &[Change] = &[
     ("/@dimension", flatten),
-    ("/@units_length", |p| p.units = UnitSystem::parse("mm", "kg", "s").expect("units")),
-    ("/@units_mass", |p| p.units = UnitSystem::parse("m", "t", "s").expect("units")),
-    ("/@units_time", |p| p.units = UnitSystem::parse("m", "kg", "ms").expect("units")),
-    ("/@units_stated", |p| p.units.stated = !p.units.stated),
+    ("/@units_length", |p| p.description.units = UnitSystem::parse("mm", "kg", "s").expect("units")),
+    ("/@units_mass", |p| p.description.units = UnitSystem::parse("m", "t", "s").expect("units")),
+    ("/@units_time", |p| p.description.units = UnitSystem::parse("m", "kg", "ms").expect("units")),
+    ("/@units_stated", |p| p.description.units.stated = !p.description.units.stated),
     ("/@storage", |p| p.storage = Storage::F32),
     ("/frame@reference_conditions", |p| p.conditions = ReferenceConditions::MeanAxes),
     ("/frame/origin", |p| p.frame.origin.y += 1e-3),

@@ -43,7 +43,10 @@ fn model() -> RawModel {
         path: PathBuf::new(),
         deformed_inertia: true,
     };
-    RawModel { interfaces, recoveries: vec![mesh.stresses(&RUBBER), cut], ..raw }
+    raw.with(|data| {
+        data.interfaces = interfaces;
+        data.recoveries = vec![mesh.stresses(&RUBBER), cut];
+    })
 }
 
 fn converted(frame: impl Into<FrameChoice>) -> FlexBody {
@@ -55,7 +58,7 @@ fn converted(frame: impl Into<FrameChoice>) -> FlexBody {
         ..ConvertSettings::default()
     };
     let body = convert(&model, &settings, &Context::QUIET).expect("a body").body;
-    changed(&body, |parts| parts.units.stated = true)
+    changed(&body, |parts| parts.description.units.stated = true)
 }
 
 fn changed(body: &FlexBody, change: impl FnOnce(&mut Parts)) -> FlexBody {

@@ -20,7 +20,7 @@ fn block() -> Assembly {
 }
 
 fn damped(damping: Damping<RawMatrix>) -> RawModel {
-    RawModel { damping: Some(damping), ..block().raw_model() }
+    block().raw_model().with(|data| data.damping = Some(damping))
 }
 
 fn run(raw: RawModel, frame: BodyFrame) -> Result<Conversion> {
@@ -74,7 +74,7 @@ fn bands_are_in_hertz_whatever_the_unit_of_time() {
     let split = 0.5 * (hertz[4] + hertz[5]);
     let mut raw = damped(Damping::Bands(vec![band(split, 0.01), band(f64::INFINITY, 0.05)]));
     // The body in milliseconds: the numbers of K are multiplied by 1e-6.
-    raw.units = UnitSystem::parse("m", "kg", "ms").unwrap();
+    raw.data.description.units = UnitSystem::parse("m", "kg", "ms").unwrap();
     let n = raw.stiffness.matrix.n_cols();
     let all: Vec<_> = entries(&raw.stiffness.matrix).map(|(r, c, v)| (r, c, 1e-6 * v)).collect();
     raw.stiffness.matrix = CscMatrix::from_triplets(n, n, &all);

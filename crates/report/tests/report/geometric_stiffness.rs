@@ -93,7 +93,10 @@ impl Case {
 
     fn raw(&self, geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>) -> RawModel {
         let interfaces = vec![NodeSet::new("tip", vec![1, 2]), NodeSet::new("side", vec![3, 4])];
-        RawModel { geometric_stiffness, interfaces, ..self.body.raw_model() }
+        self.body.raw_model().with(|data| {
+            data.geometric_stiffness = geometric_stiffness;
+            data.interfaces = interfaces;
+        })
     }
 }
 
@@ -408,11 +411,11 @@ fn failed(checks: &[IdentityCheck]) -> Vec<&'static str> {
 fn file_reports_and_recomputation_hold_what_was_given() {
     let case = Case::skew_block();
     let mut raw = case.raw(case.spin());
-    raw.geometric_stiffness.push(given(LoadKind::Force("tip".to_owned()), 2, case.pulled([0, 1], 2)));
+    raw.data.geometric_stiffness.push(given(LoadKind::Force("tip".to_owned()), 2, case.pulled([0, 1], 2)));
     let scaled: Vec<_> = entries(&raw.stiffness.matrix).map(|(r, c, v)| (r, c, 2e-6 * v)).collect();
     let n = case.body.n_dofs();
     let matrix = CscMatrix::from_triplets(n, n, &scaled);
-    raw.damping = Some(Damping::Matrix(RawMatrix { matrix, ..raw.stiffness.clone() }));
+    raw.data.damping = Some(Damping::Matrix(RawMatrix { matrix, ..raw.stiffness.clone() }));
     let body = converted(raw.clone(), BodyFrame::Principal);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("b.flex.h5");
@@ -462,7 +465,10 @@ fn file_reports_and_recomputation_hold_what_was_given() {
         geometric
     );
     assert_eq!(tampered(&|p| p.rotated_stiffness.clear()), Vec::<&str>::new());
-    let none = RawModel { geometric_stiffness: Vec::new(), damping: None, ..raw };
+    let none = raw.with(|data| {
+        data.geometric_stiffness = Vec::new();
+        data.damping = None;
+    });
     let none = FeModel::from_raw(none).expect("sound").model;
     let both = ["damping_recomputed", "geometric_stiffness_recomputed"];
     assert_eq!(failed(&verify(&body, &none).expect("the same nodes")), both);
@@ -472,7 +478,7 @@ fn file_reports_and_recomputation_hold_what_was_given() {
 fn ratios_bands_and_rayleigh_damping_are_recomputed_too() {
     let case = Case::skew_block();
     for damping in [Damping::Ratio(0.02), Damping::Rayleigh { alpha: 3.0, beta: 1e-6 }] {
-        let raw = RawModel { damping: Some(damping), ..case.body.raw_model() };
+        let raw = case.body.raw_model().with(|data| data.damping = Some(damping));
         let model = FeModel::from_raw(raw.clone()).expect("sound").model;
         let body = converted(raw, BodyFrame::Principal);
         assert_eq!(failed(&verify(&body, &model).expect("the same nodes")), Vec::<&str>::new());
@@ -551,7 +557,7 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
     let mesh = Mesh::two_bodies(ElementKind::Hex8, 1);
     let case = Case::new(mesh, Material::STEEL);
     let mut raw = case.raw(Vec::new());
-    raw.interfaces[0].nodes = vec![1];
+    raw.data.interfaces[0].nodes = vec![1];
     let n = case.body.n_dofs();
     let first = FeModel::bodies_from_raw(raw.clone()).expect("two bodies")[0].model.nodes().ids.clone();
     let others: Vec<i64> = (1..=16).filter(|id| !first.contains(id)).collect();
@@ -571,7 +577,7 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
         .flat_map(|(ends, size)| entries(&string(n, ends.map(at), size)).collect::<Vec<_>>())
         .collect();
     let both = CscMatrix::from_triplets(n, n, &both);
-    raw.geometric_stiffness = vec![
+    raw.data.geometric_stiffness = vec![
         given(LoadKind::Named("heat".to_owned()), 0, both.clone()),
         given(LoadKind::Force("tip".to_owned()), 0, own),
     ];
@@ -583,10 +589,10 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
     assert_eq!(kept(0), [("load_heat".to_owned(), 12.0), ("force_x_tip".to_owned(), 12.0)]);
     assert_eq!(kept(1), [("load_heat".to_owned(), 24.0)]);
 
-    raw.geometric_stiffness[1].matrix.matrix = both;
+    raw.data.geometric_stiffness[1].matrix.matrix = both;
     let error = FeModel::bodies_from_raw(raw.clone()).expect_err("a force on another body");
     assert!(error.has(Code::BodiesCoupled) && error.to_string().contains("the interface belongs to body 1"));
-    raw.geometric_stiffness[0].matrix.matrix =
+    raw.data.geometric_stiffness[0].matrix.matrix =
         CscMatrix::from_triplets(n, n, &[(mine, other, 1.0), (other, mine, 1.0)]);
     let error = FeModel::bodies_from_raw(raw).expect_err("coupled");
     assert!(error.to_string().contains("geometric stiffness for load `heat` couples node"), "{error}");

@@ -132,7 +132,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     assert!(failed.is_empty(), "{failed:?}");
     let mut in_frame = body.clone().into_parts();
     in_frame.frame = *taken.frame();
-    in_frame.units = taken.units().clone();
+    in_frame.description.units = taken.units().clone();
     let omega: Vec<f64> = in_frame.modes.eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     in_frame.modes.damping_ratio = (0..nf).map(|j| damping[(j, j)] / (2.0 * omega[j])).collect();
     in_frame.modes.modal_damping = Some(damping.clone());

@@ -216,10 +216,13 @@ fn the_summary_keeps_what_the_body_cannot_do() {
     };
     has(&|_| {}, "row sums: NEGATIVE masses at 312 nodes, smallest inertia +100 %, W2 31 % off");
     has(&|p| p.certificate.proved_modes = None, "NOT PROVED");
-    has(&|p| p.units = flexbody_base::units::UnitSystem::default(), "m, kg, s assumed, none stated");
+    has(
+        &|p| p.description.units = flexbody_base::units::UnitSystem::default(),
+        "m, kg, s assumed, none stated",
+    );
     has(&|p| p.source.mass_structure = MassStructure::Diagonal, "DIAGONAL (lumped) mass");
     has(&|p| p.storage = Storage::F32, "rounded to 32-bit floats");
-    has(&|p| p.source.number = Some(BodyNumber { number: 1, of: 2 }), "body 1 of 2");
+    has(&|p| p.description.number = Some(BodyNumber { number: 1, of: 2 }), "body 1 of 2");
     has(&|p| p.interfaces[0].coupling = Some(Coupling::Rigid), "rigid but DEFORMS");
     // A text has the warnings; with the summary and on a terminal they are printed apart.
     let mount = engine_mount();
@@ -414,13 +417,15 @@ fn lumped_modes_say_how_far_frequencies_move_or_why_there_are_none() {
 #[test]
 fn assumed_units_and_lumped_input_are_not_passed_over() {
     let body = changed(|p| {
-        p.units = flexbody_base::units::UnitSystem::default();
+        p.description.units = flexbody_base::units::UnitSystem::default();
         p.source.mass_structure = flexbody_body::flex_body::MassStructure::Diagonal;
     });
     let summary = text(&body, &RunData::default());
     assert!(line(&summary, "body").contains("m, kg, s assumed, none stated"));
     assert!(line(&summary, "model").contains("DIAGONAL"));
-    let sized = changed(|p| p.units = flexbody_base::units::UnitSystem::parse("0.0254", "lb", "ms").unwrap());
+    let sized = changed(|p| {
+        p.description.units = flexbody_base::units::UnitSystem::parse("0.0254", "lb", "ms").unwrap()
+    });
     assert!(line(&text(&sized, &RunData::default()), "inertia").ends_with("lb [0.0254 m]^2 (principal)"));
 }
 
@@ -428,7 +433,7 @@ fn assumed_units_and_lumped_input_are_not_passed_over() {
 fn names_cannot_inject_markup_or_terminal_codes() {
     let nasty = "<script>alert('x')</script> & \"q\" \u{1b}[31m";
     let body = changed(|p| {
-        p.source.name = nasty.to_owned();
+        p.description.name = nasty.to_owned();
         p.source.files[0].name = nasty.to_owned();
         p.source.settings = serde_json::json!({ nasty: nasty });
         p.lumped[0].scheme = nasty.to_owned();

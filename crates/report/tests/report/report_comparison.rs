@@ -295,12 +295,12 @@ fn frequencies_are_compared_mode_by_mode() {
 #[test]
 fn assumed_units_and_other_mode_counts_cannot_be_compared() {
     let body = engine_mount();
-    let tonnes = changed(&body, |p| p.units = UnitSystem::parse("mm", "t", "s").unwrap());
-    let assumed = changed(&body, |p| p.units.stated = false);
+    let tonnes = changed(&body, |p| p.description.units = UnitSystem::parse("mm", "t", "s").unwrap());
+    let assumed = changed(&body, |p| p.description.units.stated = false);
     let error = compare(&assumed, &tonnes, &Tolerances::default()).unwrap_err();
     assert!(error.has(Code::BodyIncomparable) && error.diagnostics().len() == 2, "{error}");
     // Two names of one unit are equal.
-    let tonne = changed(&body, |p| p.units = UnitSystem::parse("mm", "tonne", "s").unwrap());
+    let tonne = changed(&body, |p| p.description.units = UnitSystem::parse("mm", "tonne", "s").unwrap());
     assert!(compared(&tonnes, &tonne).passed());
     let error = compare(&body, &block(BodyFrame::Model), &Tolerances::default()).unwrap_err();
     assert!(error.to_string().contains("the first body has 8 modes, the second 6"), "{error}");
@@ -405,7 +405,7 @@ fn bodies_in_different_units_compare_by_their_meaning() {
     assert!(common.passed(), "{}", common.text());
     // One body states no units: its numbers may be in any.
     let mut parts = other.into_parts();
-    parts.units.stated = false;
+    parts.description.units.stated = false;
     let assumed = FlexBody::new(parts).expect("a body");
     assert!(compare(&metres, &assumed, &Tolerances::default()).is_err());
 }

@@ -189,7 +189,7 @@ pub fn respond(
     Ok(Response {
         random,
         diagnostics,
-        name: body.source().name.clone(),
+        name: body.description().name.clone(),
         units: body.units().clone(),
         modes: body.n_modes(),
         damped: damping.is_some(),

@@ -207,7 +207,7 @@ pub fn select_judged(
     let first = &demands[0];
     Ok(Selection {
         scene: cases.name().to_owned(),
-        body: first.body.source().name.clone(),
+        body: first.body.description().name.clone(),
         inputs: inputs(&demands),
         tolerance: cases.least_tolerance().errors,
         significances: largest_significances(

@@ -177,7 +177,7 @@ pub fn trade(
     Ok(Trade {
         scene,
         tolerance,
-        body: source.body().source().name.clone(),
+        body: source.body().description().name.clone(),
         reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
         allowed,
         front: front(&rows),

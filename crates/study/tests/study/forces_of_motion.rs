@@ -42,7 +42,7 @@ fn body(raw: &RawModel, basis: BasisChoice, modes: usize, frame: impl Into<Frame
 /// Returns a beam whose recovery has columns of the inertia of the deformation.
 fn beam() -> RawModel {
     let mut raw = skewed_beam(4.0, 5);
-    raw.recoveries[0].deformed_inertia = true;
+    raw.data.recoveries[0].deformed_inertia = true;
     raw
 }
 
@@ -141,7 +141,7 @@ fn damped_beam(rate: f64) -> RawModel {
         }
     }
     let matrix = CscMatrix::from_triplets(3 * n, 3 * n, &entries);
-    raw.damping = Some(Damping::Matrix(RawMatrix { matrix, ..raw.stiffness.clone() }));
+    raw.data.damping = Some(Damping::Matrix(RawMatrix { matrix, ..raw.stiffness.clone() }));
     raw
 }
 
@@ -165,7 +165,7 @@ fn damping_forces_count_as_loads() {
 /// dense equations of all nodes.
 fn dense_response(raw: &RawModel, omega: f64) -> Vec<Complex<f64>> {
     let [k, m] = [&raw.stiffness.matrix, &raw.mass.matrix].map(dense);
-    let d = match &raw.damping {
+    let d = match &raw.data.damping {
         Some(Damping::Matrix(damping)) => dense(&damping.matrix),
         Some(Damping::Rayleigh { alpha: 0.0, beta }) => &k * *beta,
         _ => panic!("damping of another kind"),
@@ -173,9 +173,9 @@ fn dense_response(raw: &RawModel, omega: f64) -> Vec<Complex<f64>> {
     let n = k.nrows();
     let dynamic =
         DMatrix::from_fn(n, n, |i, j| Complex::new(k[(i, j)] - omega * omega * m[(i, j)], omega * d[(i, j)]));
-    let forces = DMatrix::from_fn(n, 1, |i, _| Complex::new(raw.named_loads[0].forces[i], 0.0));
+    let forces = DMatrix::from_fn(n, 1, |i, _| Complex::new(raw.data.named_loads[0].forces[i], 0.0));
     let u = dynamic.lu().solve(&forces).expect("not at a resonance");
-    let RecoveryOperator::Rows { transposed, .. } = &raw.recoveries[0].operator else { panic!("rows") };
+    let RecoveryOperator::Rows { transposed, .. } = &raw.data.recoveries[0].operator else { panic!("rows") };
     let mut rows = vec![Complex::new(0.0, 0.0); transposed.n_cols()];
     entries(transposed).for_each(|(row, column, value)| rows[column as usize] += u[row as usize] * value);
     rows
@@ -183,10 +183,10 @@ fn dense_response(raw: &RawModel, omega: f64) -> Vec<Complex<f64>> {
 
 /// Returns the model with a unit force along y, spread evenly over the tip.
 fn pushed(mut raw: RawModel) -> RawModel {
-    let tip = raw.interfaces[1].nodes.clone();
+    let tip = raw.data.interfaces[1].nodes.clone();
     let mut forces = vec![0.0; 3 * raw.nodes.len()];
     tip.iter().for_each(|id| forces[3 * (*id as usize - 1) + 1] = 1.0 / tip.len() as f64);
-    raw.named_loads =
+    raw.data.named_loads =
         vec![ModelLoad { name: "push".to_owned(), forces, preload: false, path: PathBuf::new() }];
     raw
 }
@@ -195,7 +195,7 @@ fn pushed(mut raw: RawModel) -> RawModel {
 #[test]
 fn responses_have_the_columns_of_rates() {
     let mut raw = pushed(damped_beam(0.1));
-    raw.recoveries[0].deformed_inertia = true;
+    raw.data.recoveries[0].deformed_inertia = true;
     let craig = body(&raw, BasisChoice::CraigBampton(CraigBampton), 2, BodyFrame::Com);
     let hertz = 0.3 * craig.frequencies_hz()[0];
     let expected = dense_response(&raw, TAU * hertz);
@@ -238,11 +238,11 @@ fn responses_have_the_columns_of_rates() {
 fn damping_in_proportion_to_the_stiffness_is_in_the_static_columns() {
     let plain = pushed(skewed_beam(4.0, 5));
     let few = |damping: Option<Damping<RawMatrix>>| {
-        body(&RawModel { damping, ..plain.clone() }, BasisChoice::default(), 3, BodyFrame::Com)
+        body(&plain.clone().with(|data| data.damping = damping), BasisChoice::default(), 3, BodyFrame::Com)
     };
     let hertz = 0.1 * few(None).frequencies_hz()[0];
     let beta = 0.1 / (TAU * hertz);
-    let raw = RawModel { damping: Some(Damping::Rayleigh { alpha: 0.0, beta }), ..plain.clone() };
+    let raw = plain.clone().with(|data| data.damping = Some(Damping::Rayleigh { alpha: 0.0, beta }));
     let expected = dense_response(&raw, TAU * hertz);
     let size = expected.iter().map(|z| z.norm()).fold(0.0, f64::max);
     let band = Band::new(hertz, 1.0001 * hertz);
@@ -252,7 +252,7 @@ fn damping_in_proportion_to_the_stiffness_is_in_the_static_columns() {
         band,
         ..ResponseRequest::default()
     };
-    let damped = few(raw.damping.clone());
+    let damped = few(raw.data.damping.clone());
     let (found, _) = request.respond(Some(&model(&raw)), &damped, None, &Context::QUIET).expect("a response");
     let functions = &found.pairs[0].functions;
     let apart = |value: &dyn Fn(usize) -> Complex<f64>| {

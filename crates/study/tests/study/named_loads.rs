@@ -60,14 +60,14 @@ fn pairs(raw: &RawModel, size: f64) -> Vec<f64> {
 /// Returns a skewed beam with the load `push`, which has a resultant.
 fn pushed(size: f64) -> RawModel {
     let mut raw = skewed_beam(4.0, 5);
-    raw.named_loads = vec![named("push", random_forces(&raw, 5, size), false)];
+    raw.data.named_loads = vec![named("push", random_forces(&raw, 5, size), false)];
     raw
 }
 
 /// Returns a skewed beam with the load `push` and the preload `bolts`.
 fn bolted(size: f64) -> RawModel {
     let mut raw = pushed(size);
-    raw.named_loads.push(named("bolts", pairs(&raw, 3.0 * size), true));
+    raw.data.named_loads.push(named("bolts", pairs(&raw, 3.0 * size), true));
     raw
 }
 
@@ -108,7 +108,7 @@ fn exact_statics(raw: &RawModel, forces: &[f64]) -> (Vec<f64>, f64) {
         compliance += load * load / lambda;
         (0..n).for_each(|i| u[i] += modes.shapes[(i, j)] * load / lambda);
     }
-    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.data.recoveries[0].operator else {
         panic!("rows")
     };
     let mut rows = vec![0.0; labels.len()];
@@ -129,7 +129,7 @@ fn static_stresses(body: &FlexBody, load: usize) -> Vec<f64> {
 #[test]
 fn static_stresses_are_those_of_all_nodes_with_any_number_of_modes() {
     let raw = bolted(1.0);
-    for (at, load) in raw.named_loads.iter().enumerate() {
+    for (at, load) in raw.data.named_loads.iter().enumerate() {
         let (exact, compliance) = exact_statics(&raw, &load.forces);
         let mut alone = Vec::new();
         for frame in [FrameChoice::from(BodyFrame::Principal), FrameChoice::Interface("root".to_owned())] {
@@ -175,7 +175,7 @@ fn loads_follow_frame_basis_and_carrier() {
         ("as converted", com),
     ];
     for (what, body) in &descriptions {
-        for (load, given) in body.named_loads().iter().zip(&raw.named_loads) {
+        for (load, given) in body.named_loads().iter().zip(&raw.data.named_loads) {
             let axes = body.frame().axes.transpose();
             let (mut modal, mut turning) = (vec![0.0; body.n_modes()], Mat::<f64>::zeros(3, body.n_modes()));
             let (mut force, mut torque, mut moments) = (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());
@@ -253,7 +253,7 @@ fn motion_and_stresses_are_those_of_all_nodes() {
 /// Returns a beam with a load of unit force, spread evenly over the nodes of the tip, in a direction.
 fn pulled(direction: &Vector3<f64>) -> RawModel {
     let mut raw = skewed_beam(4.0, 5);
-    let tip = raw.interfaces[1].nodes.clone();
+    let tip = raw.data.interfaces[1].nodes.clone();
     let share = 1.0 / tip.len() as f64;
     let mut forces = vec![0.0; 3 * raw.nodes.len()];
     let mut centre = Vector3::zeros();
@@ -262,8 +262,8 @@ fn pulled(direction: &Vector3<f64>) -> RawModel {
         centre += Vector3::from(raw.nodes.positions[node]) * share;
         (0..3).for_each(|k| forces[3 * node + k] = share * direction[k]);
     }
-    raw.interfaces[1].reference = Reference::Point(centre.into());
-    raw.named_loads = vec![named("pull", forces, false)];
+    raw.data.interfaces[1].reference = Reference::Point(centre.into());
+    raw.data.named_loads = vec![named("pull", forces, false)];
     raw
 }
 
@@ -344,7 +344,7 @@ fn responses_to_a_named_load_are_those_to_the_interface_load() {
 #[test]
 fn a_preload_is_the_state_of_rest() {
     let raw = bolted(2e-3);
-    let (exact, _) = exact_statics(&raw, &raw.named_loads[1].forces);
+    let (exact, _) = exact_statics(&raw, &raw.data.named_loads[1].forces);
     let few = body(&raw, 4, BodyFrame::Com);
     let mut scene = nothing_happens("at rest", TAU / few.modes().eigenvalue[0].sqrt(), 1e-10);
     scene.run.outputs = 4;
@@ -392,7 +392,7 @@ fn loads_that_do_not_fit_are_refused() {
     let raw = skewed_beam(4.0, 3);
     let rows = 3 * raw.nodes.len();
     let refused = |loads: Vec<ModelLoad>| {
-        let raw = RawModel { named_loads: loads, ..raw.clone() };
+        let raw = raw.clone().with(|data| data.named_loads = loads);
         FeModel::from_raw(raw).expect_err("refused")
     };
     let some = random_forces(&raw, 1, 1.0);
@@ -425,11 +425,10 @@ fn with_string(raw: &RawModel, size: f64, preload: bool) -> RawModel {
     let triplets: Vec<_> = (0..3).flat_map(string).collect();
     let matrix = CscMatrix::from_triplets(rows, rows, &triplets);
     let matrix = RawMatrix { matrix, ..raw.stiffness.clone() };
-    RawModel {
-        named_loads: vec![named("bolts", pairs(raw, 1e-4), preload)],
-        geometric_stiffness: vec![GeometricStiffness { load, matrix }],
-        ..raw.clone()
-    }
+    raw.clone().with(|data| {
+        data.named_loads = vec![named("bolts", pairs(raw, 1e-4), preload)];
+        data.geometric_stiffness = vec![GeometricStiffness { load, matrix }];
+    })
 }
 
 /// In the static equilibrium under the amplitude a, (K_ff + a K_geo) q = a Psi'f.

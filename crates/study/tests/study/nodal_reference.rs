@@ -53,7 +53,7 @@ fn with_ends(mut raw: RawModel) -> RawModel {
     let (left, right) = (near(least), near(most));
     let plane = raw.nodes.positions.iter().all(|x| x[2] == 0.0);
     let beside = mean(&left) + 0.1 * (most - least) * Vector3::new(-1.0, 0.4, if plane { 0.0 } else { 0.2 });
-    raw.interfaces = vec![
+    raw.data.interfaces = vec![
         NodeSet {
             coupling: Some(Coupling::Averaging),
             reference: Reference::Point(beside.into()),
@@ -333,12 +333,12 @@ fn ratios_damp_the_modes_on_the_nodes() {
     };
     assert_same("solid", &solid(), scene);
     // The model states the damping.
-    let own = RawModel { damping: Some(Damping::Ratio(0.08)), ..solid() };
+    let own = solid().with(|data| data.damping = Some(Damping::Ratio(0.08)));
     assert_same("of the model", &own, |size, scheme| Scene {
         loads: size.at_interfaces(true),
         ..size.scene(scheme)
     });
-    let rayleigh = RawModel { damping: Some(Damping::Rayleigh { alpha: 0.1, beta: 0.02 }), ..solid() };
+    let rayleigh = solid().with(|data| data.damping = Some(Damping::Rayleigh { alpha: 0.1, beta: 0.02 }));
     assert_same("Rayleigh", &rayleigh, |size, scheme| Scene {
         requirements: Requirements::default(),
         ..scene(size, scheme)

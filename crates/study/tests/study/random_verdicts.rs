@@ -150,7 +150,7 @@ fn with_root(raw: RawModel) -> RawModel {
         reference: Reference::Point(mean.into()),
         ..NodeSet::new("root", nodes)
     };
-    RawModel { interfaces: vec![root], ..raw }
+    raw.with(|data| data.interfaces = vec![root])
 }
 
 /// Returns a random body: solid, plane, or with rotations of its nodes.

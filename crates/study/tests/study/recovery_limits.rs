@@ -33,7 +33,7 @@ fn raw_model() -> RawModel {
     let side =
         raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.7).map(|(id, _)| *id);
     let operator = RecoveryOperator::Cut { nodes: side.collect(), about: [0.7, 0.2, 0.1] };
-    raw.recoveries.push(ModelRecovery {
+    raw.data.recoveries.push(ModelRecovery {
         name: "cut".to_owned(),
         operator,
         path: PathBuf::new(),
@@ -313,7 +313,7 @@ fn rows_of_shapes_have_no_estimate() {
     let few = lowest(&whole, 6);
     // The stresses of all nodes as answers to unit displacements.
     let mut raw = raw_model();
-    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.recoveries[0].operator else {
+    let RecoveryOperator::Rows { transposed, labels, .. } = &raw.data.recoveries[0].operator else {
         panic!("rows")
     };
     let (n, rows) = (transposed.n_rows(), transposed.n_cols());
@@ -326,7 +326,7 @@ fn rows_of_shapes_have_no_estimate() {
         answer_digits: 15,
         energies: None,
     };
-    raw.recoveries[0].operator = RecoveryOperator::Shapes { shapes, labels: labels.clone() };
+    raw.data.recoveries[0].operator = RecoveryOperator::Shapes { shapes, labels: labels.clone() };
     let of_shapes = FeModel::from_raw(raw).expect("a sound model").model;
     let estimate = estimated(&of_shapes, &few, &scene);
     assert_eq!(estimate.errors.recovery, None);

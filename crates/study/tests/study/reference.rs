@@ -54,7 +54,7 @@ fn raw_rooted_beam(element: ElementKind, rule: MassRule, cells: [i32; 3], coupli
     let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.1);
     let root = NodeSet::new("root", nodes.map(|(id, _)| *id).collect());
     let interfaces = vec![NodeSet { coupling: Some(coupling), ..root }];
-    RawModel { interfaces, ..raw }
+    raw.with(|data| data.interfaces = interfaces)
 }
 
 /// Returns settings with a principal frame, so that loads and spins of the scenes are along principal axes.
@@ -448,7 +448,8 @@ fn what_is_lacking_is_damped_as_the_model_is() {
     let scene = pulled(&undamped, 16, Vector3::new(1e-5, 4e-5, 2e-5), rates[6] / rates[0], Vector3::zeros());
     // A tenth of the critical damping at that frequency.
     let damping = Some(Damping::Rayleigh { alpha: 0.0, beta: 0.2 / rates[6] });
-    let damped = FeModel::from_raw(RawModel { damping, ..raw_beam() }).expect("a sound model").model;
+    let damped =
+        FeModel::from_raw(raw_beam().with(|data| data.damping = damping)).expect("a sound model").model;
     for model in [&undamped, &damped] {
         let few = body(model, 6);
         let estimate = estimated(model, &few, &scene).errors.stress.expect("a deformed body");

@@ -21,5 +21,8 @@ pub(crate) fn skewed_beam(youngs: f64, elements: i32) -> RawModel {
     };
     let end = LENGTH * f64::from(elements);
     let interfaces = vec![set("root", &|x| x < 0.1), set("tip", &|x| x > end - 0.05)];
-    RawModel { interfaces, recoveries: vec![mesh.stresses(&rubber)], ..raw }
+    raw.with(|data| {
+        data.interfaces = interfaces;
+        data.recoveries = vec![mesh.stresses(&rubber)];
+    })
 }

@@ -30,9 +30,9 @@ fn model_of(mesh: &Mesh, is_tip: impl Fn(&[f64; 3]) -> bool) -> RawModel {
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let tip = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| is_tip(at));
     let tip = tip.map(|(id, _)| *id).collect();
-    raw.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("tip", tip) }];
-    raw.recoveries = vec![mesh.stresses(&Material::STEEL)];
-    raw.recoveries[0].deformed_inertia = true;
+    raw.data.interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new("tip", tip) }];
+    raw.data.recoveries = vec![mesh.stresses(&Material::STEEL)];
+    raw.data.recoveries[0].deformed_inertia = true;
     raw
 }
 

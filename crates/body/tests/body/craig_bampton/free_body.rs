@@ -38,7 +38,7 @@ fn check_against(exact: &[f64], basis: &ModalBasis, held: &[f64], what: &str) ->
 fn estimates_and_bounds_enclose_the_frequencies_of_the_free_body() {
     let (mut least, mut most) = (1.0f64, 1.0f64);
     for raw in models() {
-        let (what, oracle) = (format!("{:?}", raw.interfaces), Dense::new(&raw));
+        let (what, oracle) = (format!("{:?}", raw.data.interfaces), Dense::new(&raw));
         let zero = if raw.dimension == 2 { 3 } else { 6 };
         let exact = oracle.eigenvalues(oracle.allowed().as_ref(), zero);
         let held = oracle.eigenvalues(oracle.held.as_ref(), 0);
@@ -85,7 +85,7 @@ fn the_frequencies_of_fixtures_are_told_as_well_as_free_modes_know_them() {
 #[test]
 fn without_fixed_interface_modes_the_body_is_statically_condensed() {
     for raw in models() {
-        let (what, oracle) = (format!("{:?}", raw.interfaces), Dense::new(&raw));
+        let (what, oracle) = (format!("{:?}", raw.data.interfaces), Dense::new(&raw));
         let (d, held) = (usize::from(raw.dimension), oracle.eigenvalues(oracle.held.as_ref(), 0));
         let stiffness = oracle.held.transpose() * &oracle.k * &oracle.held;
         let loads = oracle.held.transpose() * (&oracle.k * &oracle.motion);

@@ -14,9 +14,9 @@ const SHARING: [[Coupling; 2]; 4] = [
 /// first.
 fn shared(couplings: [Coupling; 2], raw: RawModel) -> RawModel {
     let mut raw = raw;
-    let taken: Vec<i64> = raw.interfaces[1].nodes.iter().copied().take(2).collect();
-    raw.interfaces[0].nodes.extend(taken);
-    assert_eq!(raw.interfaces.iter().map(|set| set.coupling).collect::<Vec<_>>(), couplings.map(Some));
+    let taken: Vec<i64> = raw.data.interfaces[1].nodes.iter().copied().take(2).collect();
+    raw.data.interfaces[0].nodes.extend(taken);
+    assert_eq!(raw.data.interfaces.iter().map(|set| set.coupling).collect::<Vec<_>>(), couplings.map(Some));
     raw
 }
 
@@ -53,8 +53,8 @@ fn interfaces_whose_motions_follow_from_others_are_refused() {
     use Coupling::{Averaging, Free, Rigid};
     let told = |couplings: [Coupling; 2], nodes: &dyn Fn(&[i64]) -> Vec<i64>| {
         let mut raw = bracket(couplings);
-        raw.interfaces[1].reference = Reference::Centre;
-        raw.interfaces[1].nodes = nodes(&raw.interfaces[0].nodes);
+        raw.data.interfaces[1].reference = Reference::Centre;
+        raw.data.interfaces[1].nodes = nodes(&raw.data.interfaces[0].nodes);
         let error = modes_of(&model(raw), &CraigBampton, &lowest(3)).expect_err("not independent");
         assert!(error.has(Code::InterfaceShared), "{couplings:?}: {error}");
         assert!(error.to_string().contains("with `first`"), "{couplings:?}: {error}");
@@ -67,7 +67,7 @@ fn interfaces_whose_motions_follow_from_others_are_refused() {
     told([Rigid, Averaging], &|first| [first, &[1]].concat());
     let other = |first: &[i64]| (1..).filter(|id| !first.contains(id)).take(6).collect::<Vec<i64>>();
     let mut raw = bracket([Averaging, Averaging]);
-    let first = raw.interfaces[0].nodes.clone();
-    raw.interfaces[1].nodes = [first.as_slice(), &other(&first)].concat();
+    let first = raw.data.interfaces[0].nodes.clone();
+    raw.data.interfaces[1].nodes = [first.as_slice(), &other(&first)].concat();
     assert_eq!(craig_bampton(&model(raw), 3).solution.eigenvalues.len(), 9);
 }

@@ -13,7 +13,7 @@ fn many_modes_of_a_slender_bar_hold_to_the_rounding_of_their_summands() {
     };
     let set = |name: &str, at| NodeSet { coupling: Some(Coupling::Averaging), ..NodeSet::new(name, end(at)) };
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
-    raw.interfaces = vec![set("left", 0.0), set("right", 1.0)];
+    raw.data.interfaces = vec![set("left", 0.0), set("right", 1.0)];
     let body = body(&model(raw), 240);
     let mass = |body: &FlexBody| {
         let checks = body.parts().interface_identities();

@@ -34,7 +34,7 @@ fn interfaces_without_mass_leave_all_modes() {
         [[Coupling::Free, Coupling::Free], [Coupling::Averaging, Coupling::Free], [Coupling::Averaging; 2]]
     {
         let mut raw = bracket(couplings);
-        let light: Vec<i64> = raw.interfaces.iter().flat_map(|set| set.nodes.clone()).collect();
+        let light: Vec<i64> = raw.data.interfaces.iter().flat_map(|set| set.nodes.clone()).collect();
         let rows = raw.stiffness.matrix.n_rows();
         let mass = |row: usize| {
             if light.contains(&(row as i64 / 3 + 1)) { 0.0 } else { 0.3 + 0.01 * (row / 3) as f64 }

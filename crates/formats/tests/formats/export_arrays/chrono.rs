@@ -226,7 +226,7 @@ impl Cantilever {
 
     fn body(&self) -> FlexBody {
         let mut raw = self.assembly.raw_model();
-        raw.interfaces = [("root", 0.0), ("tip", self.size[0])]
+        raw.data.interfaces = [("root", 0.0), ("tip", self.size[0])]
             .map(|(name, at)| {
                 let nodes = self.section(at).iter().map(|&i| i as i64 + 1).collect();
                 NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new(name, nodes) }

@@ -165,7 +165,7 @@ fn simscape_has_the_matrices_of_the_body_under_the_names_of_its_example_in_both_
 #[test]
 fn names_of_frames_are_kept() {
     let mut raw = raw_fixture("robot_link");
-    for (interface, name) in raw.interfaces.iter_mut().zip(["Lager außen", "日本 \"x\""]) {
+    for (interface, name) in raw.data.interfaces.iter_mut().zip(["Lager außen", "日本 \"x\""]) {
         (interface.name, interface.coupling) = (name.to_owned(), Some(Coupling::Rigid));
     }
     let basis = BasisChoice::CraigBampton(CraigBampton);
@@ -183,7 +183,7 @@ fn names_of_frames_are_kept() {
 fn bodies_without_such_coordinates_are_refused_with_what_to_do() {
     let plane = {
         let mut raw = rectangle(8, 3, 0.4, [0.3, -0.1]);
-        raw.interfaces =
+        raw.data.interfaces =
             vec![NodeSet { coupling: Some(Coupling::Rigid), ..NodeSet::new("end", vec![1, 10, 19]) }];
         oracle::exported::body_of(raw, BasisChoice::CraigBampton(CraigBampton), BodyFrame::Model)
     };
