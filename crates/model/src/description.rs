@@ -3,8 +3,9 @@
 use crate::BodyNumber;
 use flexbody_base::units::UnitSystem;
 
-/// Name and units of a model. Every step from the manifest to the flex-body file passes the description on as a whole,
-/// so that a new text about a model is a field here, a key of the manifest, an entry of the file and a line of the reports.
+/// Name and units of a model. Every step from the manifest to the flex-body file passes the description on as a whole:
+/// a new text about a model is a field of this struct, a key of the manifest, an entry of the file and a line of the
+/// reports.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Description {
     /// Name of the model.
