@@ -35,7 +35,7 @@ pub(super) fn effect_of_soft_rotations(model: &FeModel, found: &ModalBasis) -> O
         format!(
             "{} Hz, at most about {} Hz with these rotations as in K",
             significant(with, 6),
-            significant(without, 4)
+            significant(without, 3)
         )
     };
     let message = match (0..count).find(|mode| change(*mode) > REPORTED_CHANGE) {

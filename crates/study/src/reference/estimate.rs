@@ -159,7 +159,7 @@ impl ReferenceError {
             );
         }
         let message = format!(
-            "the error of the reference body of {} modes relative to the model is itself about {} of the tolerances, first large at t = {:.1e}",
+            "the error of the reference body of {} modes relative to the model is itself about {} of the tolerances, first large at about t = {:.0e}",
             self.modes,
             self.part_of_tolerances(),
             self.time
