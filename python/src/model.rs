@@ -466,7 +466,10 @@ impl Model {
             points,
             solves,
         };
-        let mut options = stated.options(py)?.basis(self::basis(basis)?);
+        let mut options = stated.options(py)?;
+        if basis.is_some() {
+            options = options.basis(self::basis(basis)?);
+        }
         if let Some(modes) = modes {
             options = options.modes(positive(modes, "modes")?);
         }

@@ -95,3 +95,23 @@ def bracket() -> Given:
 def bracket_body() -> flexbody.Body:
     """In the frame that scenes are told in: at the centre of mass, along the axes of the model."""
     return flexbody.convert(MODELS / "bracket_hex20" / "model.toml", modes=6, frame="com")
+
+
+# The material of the cube, in Pa, and the edge of its elements in m (fixtures/models/cube_hex8).
+YOUNG, POISSON, EDGE = 7.0e10, 0.33, 0.0125
+
+
+def stress_of_element(places: Any, node: int) -> Any:
+    """The rows (6 x 3N) of the stress in Pa at the centre of a brick that has `node`, xx, yy, zz, xy, yz, xz."""
+    inwards = np.where(places[node] < 0.05, 0.5 * EDGE, -0.5 * EDGE)
+    offsets = places - (places[node] + inwards)
+    corners = np.flatnonzero(np.abs(offsets).max(axis=1) < 0.6 * EDGE)
+    # At the centre the gradient of the shape function of a corner is sign / (4 edge) along each axis.
+    gradients = np.sign(offsets[corners]) / (4 * EDGE)
+    strain = np.zeros((6, 3 * len(places)))
+    for corner, (x, y, z) in zip(corners, gradients, strict=True):
+        strain[:, 3 * corner : 3 * corner + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
+    shear = YOUNG / (2 * (1 + POISSON))
+    elasticity = np.diag([2 * shear] * 3 + [shear] * 3)
+    elasticity[:3, :3] += YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
+    return scipy.sparse.csr_array(elasticity @ strain)

@@ -207,9 +207,9 @@ def test_texts_of_errors_move_no_terminal() -> None:
 
 
 def test_no_mode_at_all_is_no_body(cube: Given) -> None:
-    with pytest.raises(flexbody.InputError, match="no mode is requested") as caught:
+    with pytest.raises(flexbody.InputError, match="leaves the body without modes") as caught:
         cube.model().convert(modes=0)
-    assert caught.value.codes == ("FB512",)
+    assert caught.value.codes == ("FB801",)
 
 
 def test_errors_carry_codes(cube: Given) -> None:

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.io
-import scipy.sparse
-from conftest import MODELS, command, results, same
+from conftest import MODELS, command, results, same, stress_of_element
 
 import flexbody
 
@@ -76,13 +75,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(MODELS / "cube_hex8", folder)
     manifest = folder / "model.toml"
     model = flexbody.read_model(manifest)
-    # Elongations between pairs of nodes: they vanish in rigid motion, as stresses do.
-    rows = scipy.sparse.lil_array((6, model.n_dofs))
-    for row in range(6):
-        a, b = 0, len(model.node_ids) - 1 - row
-        axis = model.positions[b] - model.positions[a]
-        rows[row, 3 * a : 3 * a + 3] = -axis
-        rows[row, 3 * b : 3 * b + 3] = axis
+    rows = stress_of_element(model.positions, 0)
     scipy.io.mmwrite(folder / "R.mtx", rows.tocoo())
     labels = ["row,name,quantity,component,unit"]
     labels += [f"{row},p {name},stress,{name},Pa" for row, name in enumerate(("xx", "yy", "zz", "xy", "yz", "xz"))]

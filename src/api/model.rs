@@ -149,9 +149,10 @@ impl Model {
     pub fn read_for(body: &FlexBody, path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let is_manifest = path.extension().is_some_and(|extension| extension == "toml");
-        let files = match is_manifest {
-            true => read_manifest(path)?,
-            false => ModelFiles::from_job(path, None, Vec::new(), None)?,
+        let files = if is_manifest {
+            read_manifest(path)?
+        } else {
+            ModelFiles::from_job(path, None, Vec::new(), None)?
         };
         let CheckedModel { model, diagnostics, .. } = model_of(&body.0, read_model(&files)?)?;
         Ok(Self { checked: model, residual_vectors: files.residual_vectors, diagnostics })

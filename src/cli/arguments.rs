@@ -567,9 +567,10 @@ fn ratio(text: &str) -> Result<f64, String> {
 
 /// Parses a positive length, or a percentage of the largest extent of the body.
 fn deflection(text: &str) -> Result<Deflection, String> {
-    let deflection = match text.contains('%') {
-        true => ratio(text).map(Deflection::PartOfExtent),
-        false => positive(text).map(Deflection::Length),
+    let deflection = if text.contains('%') {
+        ratio(text).map(Deflection::PartOfExtent)
+    } else {
+        positive(text).map(Deflection::Length)
     };
     deflection
         .map_err(|_| "expected a positive length, or a percentage of the largest extent (1%)".to_owned())

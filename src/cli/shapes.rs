@@ -24,10 +24,8 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     }
     let archive = arguments.output.with_extension("npz");
     let is_npz = arguments.to == ShapeFormat::Npz;
-    let outputs: Vec<PathBuf> = match is_npz {
-        true => vec![arguments.output.clone()],
-        false => vec![arguments.output.clone(), archive],
-    };
+    let outputs: Vec<PathBuf> =
+        if is_npz { vec![arguments.output.clone()] } else { vec![arguments.output.clone(), archive] };
     let files = of_manifest_or_job(&arguments.model, &arguments.job)?;
     let of_shapes = |one: &RecoverySource| matches!(one.operator, OperatorSource::Shapes { .. });
     let deformed_inertia = files.recoveries.iter().any(|one| of_shapes(one) && one.deformed_inertia);

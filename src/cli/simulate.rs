@@ -57,10 +57,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
             (Some(known), Some(own)) => known.join(own),
             (of_all, own) => *of_all = own,
         }
-        match waits {
-            true => waiting.push((simulated, slots)),
-            false => done.push(job.write(&simulated, slots, None)?),
-        }
+        if waits { waiting.push((simulated, slots)) } else { done.push(job.write(&simulated, slots, None)?) }
     }
     for (simulated, slots) in waiting {
         done.push(job.write(&simulated, slots, of_all.as_ref())?);

@@ -134,10 +134,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
 /// Returns the error about a model that the body was not made of, with the files that it was made of.
 fn of_other_model(body: &FlexBody, message: String) -> Error {
     let files: Vec<&str> = body.source().files.iter().map(|file| file.name.as_str()).collect();
-    let made_of = match files.is_empty() {
-        true => String::new(),
-        false => format!(" ({})", files.join(", ")),
-    };
+    let made_of = if files.is_empty() { String::new() } else { format!(" ({})", files.join(", ")) };
     let help = format!(
         "give the model that the body `{}` was made of{made_of}, or convert this model again",
         body.description().name

@@ -196,9 +196,10 @@ impl Writer<'_> {
         let states = &self.recording.states;
         let modes = self.group("modes")?;
         let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
-        let description = match self.recording.setting.is_in_mean_axes {
-            true => "modal coordinates of the body in mean axes, which has other modes than its file",
-            false => "modal coordinates",
+        let description = if self.recording.setting.is_in_mean_axes {
+            "modal coordinates of the body in mean axes, which has other modes than its file"
+        } else {
+            "modal coordinates"
         };
         modes.put_rows("q", unit(1, 1, 0), description, self.instants(), &q)?;
         let qd: Vec<f64> = states.iter().flat_map(|s| s.qd.iter().copied()).collect();

@@ -123,9 +123,10 @@ fn of_one_variable(opened: &dyn ExodusFile, ids: Vec<i64>, names: Vec<String>) -
 
 /// Returns the numbers of `count` nodes.
 fn ids(file: &dyn ExodusFile, count: usize) -> Diagnosed<Vec<i64>> {
-    match file.has("node_num_map") {
-        true => file.whole_numbers("node_num_map"),
-        false => Ok((1..=count as i64).collect()),
+    if file.has("node_num_map") {
+        file.whole_numbers("node_num_map")
+    } else {
+        Ok((1..=count as i64).collect())
     }
 }
 

@@ -61,12 +61,11 @@ pub(super) fn read_answers(
 ) -> Diagnosed<(RecoveryOperator, Vec<Diagnostic>)> {
     let values = read_values(files.answers, &files.listed)?;
     let is_archive = ShapeArchive::recognises(files.displacements);
-    let shapes = match is_archive {
-        true => ShapeArchive::read(files.displacements)?,
-        false => {
-            let moved = read_values(files.displacements, &files.listed)?;
-            ShapeArchive::of_results(&moved, files.displacements)?
-        }
+    let shapes = if is_archive {
+        ShapeArchive::read(files.displacements)?
+    } else {
+        let moved = read_values(files.displacements, &files.listed)?;
+        ShapeArchive::of_results(&moved, files.displacements)?
     };
     let count = shapes.count();
     if values.steps() != count {
@@ -139,9 +138,10 @@ pub fn read_point_stresses(path: &Path) -> Result<PointStresses, Error> {
 fn read_values(file: &InputFile, listed: &[&InputFile]) -> Diagnosed<StepValues> {
     let head = file.first_bytes(HEAD);
     if Hdf5.recognises(&head) {
-        return match has_nodal_variables(file) {
-            true => mesh_files::read_exodus(file),
-            false => any_program::read_hdf5(file),
+        return if has_nodal_variables(file) {
+            mesh_files::read_exodus(file)
+        } else {
+            any_program::read_hdf5(file)
         };
     }
     if is_classic(&head) {
@@ -268,9 +268,10 @@ impl ShapeArchive {
         let dofs: Vec<DofLabel> = displacements_of(&values.moved).collect();
         let unique: HashSet<&i64> = values.moved.iter().collect();
         if dofs.is_empty() || unique.len() < values.moved.len() {
-            let message = match dofs.is_empty() {
-                true => "the results have no displacements",
-                false => "the results have two displacements of a node",
+            let message = if dofs.is_empty() {
+                "the results have no displacements"
+            } else {
+                "the results have two displacements of a node"
             };
             return Err(vec![Diagnostic::new(Code::RecoveryShapes, message).in_file(file.path())]);
         }
@@ -298,9 +299,10 @@ impl ShapeArchive {
         }
         let nodes = npy::read_integers(&archive.member("nodes").map_err(about)?).map_err(about)?;
         let translations = blocks(&mut archive, "displacements").map_err(about)?;
-        let rotations = match archive.has("rotations") {
-            true => Some(blocks(&mut archive, "rotations").map_err(about)?),
-            false => None,
+        let rotations = if archive.has("rotations") {
+            Some(blocks(&mut archive, "rotations").map_err(about)?)
+        } else {
+            None
         };
         let mut seen = HashSet::new();
         if let Some(twice) = nodes.iter().find(|node| !seen.insert(**node)) {

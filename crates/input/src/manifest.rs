@@ -393,10 +393,8 @@ impl ManifestWalk<'_, '_> {
             return Some(StressStiffnessSource { location: located(file), with_stress: None });
         }
         let location = located(self.string(table, "with_stress")?);
-        let load_size = match table.contains_key("load_size") {
-            true => self.number(table, "load_size", span)?,
-            false => 1.0,
-        };
+        let load_size =
+            if table.contains_key("load_size") { self.number(table, "load_size", span)? } else { 1.0 };
         if !(load_size > 0.0 && load_size.is_finite()) {
             let message = format!("`load_size` is {load_size}, expected a positive number");
             self.complain(Code::ManifestSyntax, span.clone(), message);

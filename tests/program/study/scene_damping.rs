@@ -171,8 +171,9 @@ fn bands_and_ratios_beyond_the_critical_damping_are_those_of_the_modes() {
         "bands = [{{ to_hz = {first}, ratio = 0.01 }}, {{ to_hz = {second}, ratio = 0.1 }}, {{ ratio = 1 }}]"
     );
     let (amplitude, duration) = (1e-9, 0.002);
-    // Times the tolerance of the scene: 90 at an overdamped mode whose two rates are 34 times apart.
-    const BOUND: f64 = 1000.0 * 1e-10;
+    // Times the tolerance of the scene: with tolerances of 1e-8 to 1e-11 the steps happen to give 2 to 2500 at an overdamped
+    // mode, whose two rates are 34 times apart.
+    const BOUND: f64 = 10_000.0 * 1e-10;
     for (damping, ratio_of) in [
         (bands.as_str(), [0.01, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0]),
         ("ratio = 3.0", [3.0; 8]),

@@ -95,9 +95,10 @@ impl BodyOfModel<'_> {
         let inertia = asked.iter().any(|one| one.deformed_inertia);
         let loads = StaticLoads::new(self.model, &basis, &self.modes.vectors, inertia)?;
         let is_cut = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Cut { .. });
-        let responses = match !asked.iter().all(is_cut) || !named_loads.is_empty() {
-            true => self.responses(&basis, &loads, groups, context)?,
-            false => Responses { fields: Mat::new(), compliances: Vec::new() },
+        let responses = if !asked.iter().all(is_cut) || !named_loads.is_empty() {
+            self.responses(&basis, &loads, groups, context)?
+        } else {
+            Responses { fields: Mat::new(), compliances: Vec::new() }
         };
         named_loads.iter_mut().zip(&responses.compliances).for_each(|(load, c)| load.compliance = Some(*c));
         let responses = responses.fields;

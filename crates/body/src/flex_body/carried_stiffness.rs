@@ -99,9 +99,10 @@ impl FlexBody {
                     moment: unit(k).cross(&(inertia * unit(l))),
                 };
                 let (one, other) = (of(k, l), of(l, k));
-                match k == l {
-                    true => one,
-                    false => Resultant { force: one.force + other.force, moment: one.moment + other.moment },
+                if k == l {
+                    one
+                } else {
+                    Resultant { force: one.force + other.force, moment: one.moment + other.moment }
                 }
             }
             LoadKind::Force(at) => {

@@ -223,13 +223,14 @@ pub(crate) fn in_motion(
     if let Some((share, scene)) = first_largest(shares, |one| one.0) {
         let error = if share < 1.0 { share / (1.0 - share) } else { f64::INFINITY };
         let percent = |error: f64| format!("{} %", significant(100.0 * error, 2));
-        let size = match error.is_finite() {
-            true => format!(
+        let size = if error.is_finite() {
+            format!(
                 "in the scene `{scene}` deflections change by at most {}, frequencies by at most {}",
                 percent(error),
                 percent(0.5 * error)
-            ),
-            false => format!("in the scene `{scene}` it exceeds the stiffness of the body"),
+            )
+        } else {
+            format!("in the scene `{scene}` it exceeds the stiffness of the body")
         };
         let text = format!("{what}: {size}");
         return if error <= MAX_SLIGHT_STIFFNESS { Slight(text) } else { Lost(text) };

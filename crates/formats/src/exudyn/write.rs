@@ -345,14 +345,15 @@ fn rotations(body: &FlexBody) -> Holding {
     };
     let names: Vec<String> =
         body.interfaces().iter().filter(needs).map(|interface| format!("`{}`", interface.name)).collect();
-    match names.is_empty() {
-        true => Slight(
-            "the rotations of the nodes in the modes: deflections and frequencies do not depend on them, but markers at single nodes do not turn with them".to_owned(),
-        ),
-        false => Lost(format!(
+    if names.is_empty() {
+        Slight(
+        "the rotations of the nodes in the modes: deflections and frequencies do not depend on them, but markers at single nodes do not turn with them".to_owned(),
+    )
+    } else {
+        Lost(format!(
             "the rotations of the nodes in the modes, without which joints do not turn with {}; --points interfaces writes them",
             names.join(", ")
-        )),
+        ))
     }
 }
 

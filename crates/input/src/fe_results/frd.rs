@@ -245,10 +245,8 @@ impl<'f> FrdReading<'f> {
         let Some(wanted) = wanted else { return Ok(()) };
         self.digits = self.digits.min(heading.form.digits());
         let is_stress = name == b"STRESS";
-        let has_values = |step: &Step| match is_stress {
-            true => !step.stresses.is_empty(),
-            false => !step.displacements.is_empty(),
-        };
+        let has_values =
+            |step: &Step| if is_stress { !step.stresses.is_empty() } else { !step.displacements.is_empty() };
         // Each step, increment or mode has one block of displacements and one of stresses, in any order.
         let is_new = self.number != Some(heading.number) || self.steps.last().is_none_or(has_values);
         if is_new {

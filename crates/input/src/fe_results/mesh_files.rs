@@ -67,9 +67,10 @@ fn beside(listing: &Path, member: &str) -> PathBuf {
 /// FB327 for another mesh, for a step without one of the two arrays, and for points without numbers.
 pub(super) fn read_vtk(file: &InputFile, members: &[&InputFile]) -> Diagnosed<StepValues> {
     let members: &Opened<'_> = &members.iter().map(|member| (member.path(), *member)).collect();
-    let listed = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
-        true => collection(file.bytes()).map_err(|message| unreadable(file, message))?,
-        false => None,
+    let listed = if node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
+        collection(file.bytes()).map_err(|message| unreadable(file, message))?
+    } else {
+        None
     };
     if let Some(listed) = listed {
         return read_collection(file, &listed, members);
@@ -125,9 +126,10 @@ fn read_collection(
 
 /// Returns the numbers of the points of a mesh and the arrays at them; of a parallel file those of all pieces.
 fn point_data(file: &InputFile, members: &Opened<'_>) -> Diagnosed<(Vec<i64>, Vec<PointArray>)> {
-    let sources = match node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
-        true => pieces(file.bytes()).map_err(|message| unreadable(file, message))?,
-        false => None,
+    let sources = if node_files::is_vtk_xml(&file.first_bytes(HEAD)) {
+        pieces(file.bytes()).map_err(|message| unreadable(file, message))?
+    } else {
+        None
     };
     match sources {
         Some(sources) => data_of_pieces(file, &sources, members),

@@ -58,9 +58,10 @@ impl JobReader for Calculix {
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
         let knots = Knots::of(&mesh, &labels, &rotations, &dof)?;
-        let ([stiffness, mass], given_rows) = match knots.are_absent() {
-            true => ([stiffness, mass], GivenRows::default()),
-            false => knots.condensed([stiffness, mass], &dof)?,
+        let ([stiffness, mass], given_rows) = if knots.are_absent() {
+            ([stiffness, mass], GivenRows::default())
+        } else {
+            knots.condensed([stiffness, mass], &dof)?
         };
         let labels = knots.labels(labels);
         let Once { labels, places, copies } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;

@@ -77,16 +77,18 @@ impl ManifestWalk<'_, '_> {
             self.require_rows(table, span, &name);
             let operator = MatrixLocation::parse(self.string(table, "operator")?).relative_to(&folder);
             let rows = folder.join(self.string(table, "rows")?);
-            let offset = match table.contains_key("offset") {
-                true => Some(MatrixLocation::parse(self.string(table, "offset")?).relative_to(&folder)),
-                false => None,
+            let offset = if table.contains_key("offset") {
+                Some(MatrixLocation::parse(self.string(table, "offset")?).relative_to(&folder))
+            } else {
+                None
             };
             OperatorSource::Rows { operator, rows, offset }
         } else if key == "shapes" {
             let answers = folder.join(self.string(table, "shapes")?);
-            let displacements = match table.contains_key("displacements") {
-                true => folder.join(self.string(table, "displacements")?),
-                false => answers.with_extension("npz"),
+            let displacements = if table.contains_key("displacements") {
+                folder.join(self.string(table, "displacements")?)
+            } else {
+                answers.with_extension("npz")
             };
             // CalculiX prints the strain energies into a file beside its results.
             let is_frd = answers.extension().is_some_and(|extension| extension == "frd");

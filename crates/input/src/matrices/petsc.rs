@@ -142,9 +142,10 @@ impl<'a> Stored<'a> {
 
     /// Returns column and value of an entry.
     fn entry(&self, k: usize) -> (i64, f64) {
-        let value = match self.is_single {
-            true => self.values[4 * k..].first_chunk().map(|b| f64::from(f32::from_be_bytes(*b))),
-            false => self.values[8 * k..].first_chunk().map(|b| f64::from_be_bytes(*b)),
+        let value = if self.is_single {
+            self.values[4 * k..].first_chunk().map(|b| f64::from(f32::from_be_bytes(*b)))
+        } else {
+            self.values[8 * k..].first_chunk().map(|b| f64::from_be_bytes(*b))
         };
         (self.whole.get(self.indices, k).unwrap_or(-1), value.unwrap_or(f64::NAN))
     }

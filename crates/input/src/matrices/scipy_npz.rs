@@ -93,10 +93,11 @@ fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic
             let mut places = Vec::with_capacity(indices.len());
             for (major, pair) in pointers.windows(2).enumerate() {
                 let of_major = &indices[pair[0] as usize..pair[1] as usize];
-                places.extend(of_major.iter().map(|&minor| match by_rows {
-                    true => [major as i64, minor],
-                    false => [minor, major as i64],
-                }));
+                places.extend(
+                    of_major
+                        .iter()
+                        .map(|&minor| if by_rows { [major as i64, minor] } else { [minor, major as i64] }),
+                );
             }
             places
         }

@@ -142,13 +142,14 @@ fn difference(stressed: &RawMatrix, plain: &RawMatrix, load_size: f64) -> Result
     let of_stress = largest(&mut entries.iter().map(|entry| entry.2));
     let left = f64::from(digits) + (of_stress / of_stiffness).log10();
     if left.is_nan() || left < MIN_DIGITS {
-        let message = match of_stress > 0.0 {
-            true => format!(
+        let message = if of_stress > 0.0 {
+            format!(
                 "matrix with stress differs from K by {:.1e} of its largest entry, of which {digits} digits show {:.1}: the stress is too small",
                 of_stress / of_stiffness,
                 left.max(0.0)
-            ),
-            false => "matrix with stress is K itself: it was written without the stress".to_owned(),
+            )
+        } else {
+            "matrix with stress is K itself: it was written without the stress".to_owned()
         };
         let unstressed = Diagnostic::new(Code::GeometricStiffnessUnstressed, message).in_file(path);
         return Err(unstressed.with_help(UNSTRESSED_HELP));

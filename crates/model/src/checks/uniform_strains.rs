@@ -338,9 +338,10 @@ impl UniformStrains {
             return "nothing resists one of the uniform strains".to_owned();
         }
         let share = significant(100.0 * self.residual, 2);
-        let causes = match self.turns {
-            true => "shells, beams, rigid connections",
-            false => "several materials, rigid connections, or elements that fail the patch test",
+        let causes = if self.turns {
+            "shells, beams, rigid connections"
+        } else {
+            "several materials, rigid connections, or elements that fail the patch test"
         };
         format!(
             "{share} % of the forces under uniform strain are not those of one homogeneous solid ({causes})"
@@ -591,9 +592,6 @@ impl Relation {
             }
         };
         let differing: Vec<String> = (0..6).filter_map(one).collect();
-        match differing.is_empty() {
-            true => "components are combined".to_owned(),
-            false => differing.join(", "),
-        }
+        if differing.is_empty() { "components are combined".to_owned() } else { differing.join(", ") }
     }
 }

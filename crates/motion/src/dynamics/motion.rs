@@ -183,9 +183,10 @@ impl<'a> Motion<'a> {
         put(&(axes * evaluation.angular_momentum()), layout.angular(), &mut state);
         evaluation.modal_momentum(&mut state[layout.modal()..layout.offset()]);
 
-        let natural = match equations.is_normalised() {
-            true => None,
-            false => NaturalModes::new(equations, &surroundings.prescribed(0.0, &axes).0),
+        let natural = if equations.is_normalised() {
+            None
+        } else {
+            NaturalModes::new(equations, &surroundings.prescribed(0.0, &axes).0)
         };
         let oscillator = |j: usize| {
             let own = natural.as_ref().map(|natural| natural.oscillators[j]);

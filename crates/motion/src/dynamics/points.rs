@@ -167,9 +167,10 @@ impl BodyPoint {
         let torque = load.torque_at(&vec![0.0; nf]);
         let turning = |k: usize, j: usize| if load.preload { 0.0 } else { load.turning[(k, j)] };
         let linear = PointMotion::new(nf, |k, j| if k == 0 { load.modal[j] } else { 0.0 });
-        let translation = match terms.geometric_stiffness {
-            true => linear.with_geometric_stiffness(body, &LoadKind::Named(load.name.clone())),
-            false => linear,
+        let translation = if terms.geometric_stiffness {
+            linear.with_geometric_stiffness(body, &LoadKind::Named(load.name.clone()))
+        } else {
+            linear
         };
         Self {
             position: Vector3::zeros(),

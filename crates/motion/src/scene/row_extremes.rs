@@ -382,9 +382,10 @@ impl PointEnvelope {
                 *value = z.iter().enumerate().map(|(c, z)| forms[(i, c)] * z).sum();
             }
             let von_mises = von_mises_of(&values);
-            match between {
-                true => self.von_mises.see(time, von_mises),
-                false => raise(&mut self.von_mises, time, von_mises),
+            if between {
+                self.von_mises.see(time, von_mises)
+            } else {
+                raise(&mut self.von_mises, time, von_mises)
             }
             // The norm bounds the principal stresses, whose computation is the costly part.
             let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt();

@@ -112,10 +112,8 @@ impl Trace {
             Some(own) => (own - time).abs(),
             None => f64::INFINITY,
         };
-        let first = match distance(after.checked_sub(2)) < distance(Some(after + 1)) {
-            true => after - 2,
-            false => after - 1,
-        };
+        let first =
+            if distance(after.checked_sub(2)) < distance(Some(after + 1)) { after - 2 } else { after - 1 };
         first..(first + 3).min(count)
     }
 
@@ -328,9 +326,10 @@ impl MotionHistory {
         let (modal, attitude) = all.columns.split_at(n_modes);
         let rows = 0..all.times.len();
         let q = rows.clone().map(|i| row(i, modal)).collect();
-        let attitude = match has_attitude {
-            true => Some(rows.map(|i| unit(&row(i, attitude), &all, i, path)).collect::<Result<Vec<_>>>()?),
-            false => None,
+        let attitude = if has_attitude {
+            Some(rows.map(|i| unit(&row(i, attitude), &all, i, path)).collect::<Result<Vec<_>>>()?)
+        } else {
+            None
         };
         Ok(Self { path: path.to_owned(), time: all.times, attitude, q })
     }

@@ -37,9 +37,10 @@ impl ModePair {
     /// Returns the numbers of the modes, their frequencies and the difference in words.
     pub(super) fn in_words(&self) -> String {
         let [a, b] = [self.frequency_a_hz, self.frequency_b_hz].map(|hertz| frequency(hertz, 7));
-        let second = match self.mode_a == self.mode_b {
-            true => "in the second".to_owned(),
-            false => format!("in the second (its mode {})", self.mode_b),
+        let second = if self.mode_a == self.mode_b {
+            "in the second".to_owned()
+        } else {
+            format!("in the second (its mode {})", self.mode_b)
         };
         format!(
             "mode {}: {a} in the first body, {b} {second}, {}",

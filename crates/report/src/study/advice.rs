@@ -243,9 +243,10 @@ fn programs(groups: TermGroups) -> Vec<ProgramFacts> {
         (_, false, true) => "Custom: all invariants but 9",
         (_, true, true) => "Full coupling (all nine invariants)",
     };
-    let recurdyn = match groups.w2 || groups.w3 {
-        true => "Mass Invariant: Full",
-        false => "Mass Invariant: Partial (without N4 and N6)",
+    let recurdyn = if groups.w2 || groups.w3 {
+        "Mass Invariant: Full"
+    } else {
+        "Mass Invariant: Partial (without N4 and N6)"
     };
     let rows = [
         ("Adams", adams),

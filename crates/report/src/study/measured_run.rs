@@ -77,9 +77,10 @@ impl<'a> MeasuredRunFacts<'a> {
                 format!("from the first to the second half of the run the error grows {words}"),
             )
         });
-        let reference = match self.reference_modes == self.modes {
-            true => "the body itself, with the accuracy of the scene".to_owned(),
-            false => format!("a body of {}", counted(self.reference_modes, "mode")),
+        let reference = if self.reference_modes == self.modes {
+            "the body itself, with the accuracy of the scene".to_owned()
+        } else {
+            format!("a body of {}", counted(self.reference_modes, "mode"))
         };
         let run = format!(
             "{}, {} with {}",

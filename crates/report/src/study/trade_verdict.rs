@@ -123,12 +123,13 @@ fn against(trade: &Trade, own: &Measured) -> String {
     if let Some(varied) = fails.filter(|_| part + case.reserved <= 1.0) {
         return format!("holds in the scene and {}", in_variation(trade, varied));
     }
-    let reference = match part <= 1.0 && case.reserved > 0.0 {
-        true => format!(
+    let reference = if part <= 1.0 && case.reserved > 0.0 {
+        format!(
             ", and the error of the reference is another {} times the tolerance",
             significant(case.reserved, 2)
-        ),
-        false => String::new(),
+        )
+    } else {
+        String::new()
     };
     let times = significant(part, 2);
     format!("has an error in {output} of {times} times the tolerance{}{reference}", in_case(trade, own))

@@ -210,9 +210,10 @@ pub fn participations(
         for direction in load.force.directions() {
             let forces = (0..eigenvalues.len()).map(|j| psi.column(j).dot(&direction)).collect();
             let [x, y, z] = direction.into();
-            let name = match load.is_named() {
-                true => load.at.to_string(),
-                false => format!("force {x}, {y}, {z} at {}", load.at),
+            let name = if load.is_named() {
+                load.at.to_string()
+            } else {
+                format!("force {x}, {y}, {z} at {}", load.at)
             };
             add(name, forces, &at_interface);
         }

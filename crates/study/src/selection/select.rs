@@ -168,18 +168,17 @@ pub fn select_judged(
     }
     // By simulation if every case has a duration, else by the frequency band.
     let mut selection_state = SelectionState::new(&demands);
-    let mode_reason = match selection_state.has_run() {
-        false => selection_state.choose_by_band(),
-        true => {
-            let variations = cases.variations(body.dimension());
-            let framed = framed_variations(body, &variations)?;
-            context.phase("reference motion of the variations");
-            context.runs(variations.len());
-            let varied = VariedRuns::new(&variations, cases, &framed, varied_reference_errors, context)?;
-            selection_state.diagnostics.extend(varied.diagnostics.iter().cloned());
-            let varied = Some(&varied).filter(|varied| !varied.is_empty());
-            selection_state.choose_by_motion(cases, varied, context)?
-        }
+    let mode_reason = if !selection_state.has_run() {
+        selection_state.choose_by_band()
+    } else {
+        let variations = cases.variations(body.dimension());
+        let framed = framed_variations(body, &variations)?;
+        context.phase("reference motion of the variations");
+        context.runs(variations.len());
+        let varied = VariedRuns::new(&variations, cases, &framed, varied_reference_errors, context)?;
+        selection_state.diagnostics.extend(varied.diagnostics.iter().cloned());
+        let varied = Some(&varied).filter(|varied| !varied.is_empty());
+        selection_state.choose_by_motion(cases, varied, context)?
     };
     // State the reasons of the decision.
     let SelectionState {

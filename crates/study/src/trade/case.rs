@@ -287,10 +287,8 @@ impl<'j> Judge<'j> {
         names: &[Option<String>],
         context: &Context<'_>,
     ) -> Result<Self> {
-        let (sources, before) = match varied.sources.is_empty() {
-            true => (sources, 0),
-            false => (&varied.sources[..], 1),
-        };
+        let (sources, before) =
+            if varied.sources.is_empty() { (sources, 0) } else { (&varied.sources[..], 1) };
         let reserved = reserved(&varied.reference_errors, false);
         let (mut cases, mut variations, mut diagnostics) = (Vec::new(), Vec::new(), Vec::new());
         for (at, one) in varied.variations.iter().enumerate() {

@@ -56,9 +56,10 @@ fn matrix(answer: &Matrix6<f64>, conditions: &Matrix6<f64>, given: [bool; 6]) ->
     both.fixed_view_mut::<6, 6>(0, 0).copy_from(answer);
     both.fixed_view_mut::<6, 6>(0, 6).copy_from(&-conditions.transpose());
     for (k, given) in given.into_iter().enumerate() {
-        match given {
-            true => both[(6 + k, 6 + k)] = 1.0,
-            false => both.fixed_view_mut::<1, 6>(6 + k, 0).copy_from(&conditions.row(k)),
+        if given {
+            both[(6 + k, 6 + k)] = 1.0
+        } else {
+            both.fixed_view_mut::<1, 6>(6 + k, 0).copy_from(&conditions.row(k))
         }
     }
     both
