@@ -84,6 +84,11 @@ if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
     rustup target add "$target"
 fi
 
+step "each optional part alone"
+for part in cluster embedded-c import response; do
+    cargo check --package flexbody --lib --bins --locked --no-default-features --features "cli,bundled-hdf5,$part"
+done
+
 step "build"
 [ -n "${FLEXBODY:-}" ] || cargo build --release --locked --package flexbody
 # The two usual compilers are found without being told.
