@@ -24,13 +24,14 @@ fi
 tell_progress() {
     local log="$1" all minutes=0
     all="$(cargo tree "${build[@]:1}" --edges normal,build --prefix none 2>/dev/null | cut -d' ' -f1,2 | sort -u | wc -l)"
-    while sleep 60; do
+    # Without the output of this script, which a pipe would otherwise wait for until the last minute is over.
+    while sleep 60 >/dev/null 2>&1; do
         minutes=$((minutes + 1))
         echo "building since $minutes min: $(grep -c '^ *Compiling ' "$log") of some $all packages begun, the largest come last"
     done
 }
 
-echo "building the program: some 10 minutes of one processor the first time, half of that on two"
+echo "building the program: 12 to 20 minutes of one processor the first time, half of that on two"
 if [ -t 2 ]; then
     cargo build "${build[@]}"
 else

@@ -85,10 +85,8 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
     let parts = [(mesh.part(|node| node[0] < border), stiff), (mesh.part(|node| node[0] >= border), soft)];
     let [left, right] = parts.each_ref().map(|(part, material)| part.assemble(material, rule));
     let raw = left.plus(&right).raw_model();
-    let geometric_stiffness = match rule == MassRule::Consistent && one_in(random, 3) {
-        true => of_spin(&raw, &parts),
-        false => Vec::new(),
-    };
+    let geometric_stiffness =
+        if rule == MassRule::Consistent && one_in(random, 3) { of_spin(&raw, &parts) } else { Vec::new() };
     raw.with(|data| data.geometric_stiffness = geometric_stiffness)
 }
 
@@ -109,16 +107,15 @@ fn with_ends(raw: RawModel, by_node: bool, offset: Option<Vector3<f64>>) -> RawM
             ..NodeSet::new(name, nodes.iter().map(|&i| raw.nodes.ids[i]).collect())
         }
     };
-    let root = match by_node {
-        true => {
-            let own = NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect());
-            let beside = offset.zip(raw.nodes.positions.last()).map(|(by, x)| Vector3::from(*x) + by);
-            match beside {
-                Some(point) => NodeSet { reference: Reference::Point(point.into()), ..own },
-                None => own,
-            }
+    let root = if by_node {
+        let own = NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect());
+        let beside = offset.zip(raw.nodes.positions.last()).map(|(by, x)| Vector3::from(*x) + by);
+        match beside {
+            Some(point) => NodeSet { reference: Reference::Point(point.into()), ..own },
+            None => own,
         }
-        false => set("root", &order[..AT_ROOT]),
+    } else {
+        set("root", &order[..AT_ROOT])
     };
     let interfaces = vec![root, set("tip", &order[order.len() - AT_TIP..])];
     raw.with(|data| data.interfaces = interfaces)

@@ -56,10 +56,7 @@ pub fn subject(seed: u64) -> Result<Subject> {
     let raw = bodies::body(kind, random);
     let scene = nothing_happens("crossing", 1.0, TOLERANCE);
     let frame = FrameChoice::Mean(BodyFrame::ALL[pick(random, BodyFrame::ALL.len())]);
-    let frame = match one_in(&mut stream(seed, 9), 3) {
-        true => frames(&raw).pop().unwrap_or(frame),
-        false => frame,
-    };
+    let frame = if one_in(&mut stream(seed, 9), 3) { frames(&raw).pop().unwrap_or(frame) } else { frame };
     let subject = Subject {
         kind: KINDS[kind],
         raw,
@@ -83,9 +80,10 @@ pub fn subject(seed: u64) -> Result<Subject> {
             .scene(&subject.raw, &probe)
     };
     let scene = scene_of(2, duration)?;
-    let second = match one_in(random, 5) {
-        true => Some(Scene { name: "second".to_owned(), ..scene_of(4, 0.7 * duration)? }),
-        false => None,
+    let second = if one_in(random, 5) {
+        Some(Scene { name: "second".to_owned(), ..scene_of(4, 0.7 * duration)? })
+    } else {
+        None
     };
     Ok(Subject { scene, second, ..subject })
 }
@@ -191,9 +189,10 @@ impl Scales<'_> {
 
     fn carried(&mut self, speed: f64, raw: &RawModel) -> Carried {
         let turning: Vec<i64> = raw.nodes.ids.iter().copied().filter(|&id| turns(raw, id)).collect();
-        let by = match turning.is_empty() || one_in(self.random, 2) {
-            true => Point::Interface("root".to_owned()),
-            false => Point::Node(turning[pick(self.random, turning.len())]),
+        let by = if turning.is_empty() || one_in(self.random, 2) {
+            Point::Interface("root".to_owned())
+        } else {
+            Point::Node(turning[pick(self.random, turning.len())])
         };
         let spin = one_in(self.random, 2).then(|| {
             let (velocity, axes) = self.turning(speed);
@@ -230,25 +229,19 @@ impl Scales<'_> {
             return Load::named(named_loads::WIND, self.history());
         }
         let node = raw.nodes.ids[pick(self.random, raw.nodes.len())];
-        let at = match one_in(self.random, 3) {
-            true => Point::Interface("tip".to_owned()),
-            false => Point::Node(node),
-        };
+        let at = if one_in(self.random, 3) { Point::Interface("tip".to_owned()) } else { Point::Node(node) };
         let takes_torque = at == Point::Interface("tip".to_owned()) || turns(raw, node);
         let factor = self.history();
-        let force = match one_in(self.random, 4) {
-            true => self.columns(1.0, false),
-            false => VectorHistory::Along {
-                direction: direction(self.random, self.dimension),
-                factor: factor.clone(),
-            },
+        let force = if one_in(self.random, 4) {
+            self.columns(1.0, false)
+        } else {
+            VectorHistory::Along { direction: direction(self.random, self.dimension), factor: factor.clone() }
         };
-        let torque = match takes_torque && one_in(self.random, 2) {
-            true => {
-                let turn = axis(self.random, self.dimension) * (0.3 * self.extent);
-                VectorHistory::Along { direction: turn, factor }
-            }
-            false => VectorHistory::nothing(),
+        let torque = if takes_torque && one_in(self.random, 2) {
+            let turn = axis(self.random, self.dimension) * (0.3 * self.extent);
+            VectorHistory::Along { direction: turn, factor }
+        } else {
+            VectorHistory::nothing()
         };
         Load { at, force, torque, axes: [Axes::World, Axes::Model][pick(self.random, 2)] }
     }
@@ -265,9 +258,10 @@ impl Scales<'_> {
             _ => {
                 let times: Vec<f64> = [0.0, 0.3, 0.55, 1.0].map(|x| x * part * self.duration).to_vec();
                 let values = vec![0.0, self.random.signed(), 1.0, self.random.signed()];
-                match one_in(self.random, 2) {
-                    true => History::Table { times, values },
-                    false => History::samples(times, &values, Interpolation::Cubic, true),
+                if one_in(self.random, 2) {
+                    History::Table { times, values }
+                } else {
+                    History::samples(times, &values, Interpolation::Cubic, true)
                 }
             }
         }

@@ -48,9 +48,8 @@ pub fn of_spin(raw: &RawModel, parts: &[(Mesh, Material)]) -> Vec<GeometricStiff
     let of_load = |component: usize| {
         let (k, l) = LoadKind::SPIN[component];
         // Coefficient of w_k w_l in w x (w x x).
-        let centripetal = |x: Vector3<f64>| match k == l {
-            true => Vector3::ith(k, x[k]) - x,
-            false => Vector3::ith(k, x[l]) + Vector3::ith(l, x[k]),
+        let centripetal = |x: Vector3<f64>| {
+            if k == l { Vector3::ith(k, x[k]) - x } else { Vector3::ith(k, x[l]) + Vector3::ith(l, x[k]) }
         };
         let acceleration = DVector::from_fn(3 * n, |row, _| centripetal(arm(row / 3))[row % 3]);
         let moved = solve(-(&mass * acceleration));

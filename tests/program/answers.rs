@@ -22,12 +22,11 @@ fn converted(folder: &Path, answers: &Path) -> Result<Recovery, String> {
     fs::write(folder.join("model.toml"), manifest + &recovery).expect("written");
     let line = "convert model.toml --modes 3 -o body.flex.h5";
     let run = flexbody(folder, &line.split(' ').collect::<Vec<_>>());
-    match run.status.success() {
-        true => {
-            let body = flexbody_file::read(folder.join("body.flex.h5")).expect("a body");
-            Ok(body.recoveries()[0].clone())
-        }
-        false => Err(String::from_utf8_lossy(&run.stderr).into_owned()),
+    if run.status.success() {
+        let body = flexbody_file::read(folder.join("body.flex.h5")).expect("a body");
+        Ok(body.recoveries()[0].clone())
+    } else {
+        Err(String::from_utf8_lossy(&run.stderr).into_owned())
     }
 }
 

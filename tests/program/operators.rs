@@ -23,9 +23,10 @@ fn converted(folder: &Path, operator: &str, rows: &str) -> Result<FlexBody, Stri
         format!("\n[[recovery]]\nname = \"gauges\"\noperator = \"{operator}\"\nrows = \"{rows}\"\n");
     fs::write(folder.join("model.toml"), manifest + &recovery).expect("written");
     let run = flexbody(folder, &["convert", "model.toml", "--modes", "5", "-o", "body.flex.h5"]);
-    match run.status.success() {
-        true => Ok(flexbody_file::read(folder.join("body.flex.h5")).expect("a body")),
-        false => Err(String::from_utf8_lossy(&run.stderr).into_owned()),
+    if run.status.success() {
+        Ok(flexbody_file::read(folder.join("body.flex.h5")).expect("a body"))
+    } else {
+        Err(String::from_utf8_lossy(&run.stderr).into_owned())
     }
 }
 

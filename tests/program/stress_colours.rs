@@ -245,10 +245,8 @@ fn the_envelope_is_that_of_all_load_cases() {
     let said: Value = serde_json::from_str(&said).expect("JSON");
     let of_skin = &said["results"]["envelope"]["recoveries"][1];
     assert_eq!((of_skin["name"].as_str(), of_skin["von_mises"].as_f64()), (Some("skin"), Some(values[top])));
-    let (case, words) = match of_fast(top + 2) {
-        true => ("fast", "of load case `fast`"),
-        false => ("slow-x", "of load case `slow-x`"),
-    };
+    let (case, words) =
+        if of_fast(top + 2) { ("fast", "of load case `fast`") } else { ("slow-x", "of load case `slow-x`") };
     assert_eq!((&of_skin["case"], &of_skin["node"]), (&case.into(), &body.nodes().ids[top].into()));
     done(folder.path(), "view body.flex.h5 --envelope all.csv -o view.html");
     let mut pages = vec![(folder.path().join("view.html"), 0)];

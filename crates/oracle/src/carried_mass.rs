@@ -56,9 +56,10 @@ impl Carrier {
             follows.view_mut((3, row), (3, 1)).copy_from(&theta);
         }
         let offsets = OFFSETS.iter().enumerate().flat_map(|(k, size)| [*size, -size].map(|size| (k, size)));
-        let masses: Vec<Vector3<f64>> = match with_inertia {
-            true => offsets.map(|(k, size)| place + turn * Vector3::ith(k, size * scale)).collect(),
-            false => vec![place; 6],
+        let masses: Vec<Vector3<f64>> = if with_inertia {
+            offsets.map(|(k, size)| place + turn * Vector3::ith(k, size * scale)).collect()
+        } else {
+            vec![place; 6]
         };
         let mut own = DMatrix::zeros(6, 6);
         for x in &masses {

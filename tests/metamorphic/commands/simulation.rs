@@ -62,9 +62,10 @@ pub fn simulation(subject: &Subject) -> Result<Outputs> {
     places(&recording, &sizes, &mut outputs);
     states(&recording, &sizes, &mut outputs);
     largest(&recording, &sizes, &mut outputs);
-    match subject.by_table {
-        true => outputs_of_rows(&of_table(&body, subject, &recording)?, &sizes, &mut outputs),
-        false => recording.recovered.iter().for_each(|rows| outputs_of_rows(rows, &sizes, &mut outputs)),
+    if subject.by_table {
+        outputs_of_rows(&of_table(&body, subject, &recording)?, &sizes, &mut outputs)
+    } else {
+        recording.recovered.iter().for_each(|rows| outputs_of_rows(rows, &sizes, &mut outputs))
     }
     outputs.all.extend(findings(&found));
     Ok(outputs)

@@ -82,9 +82,10 @@ impl Driven {
         // The point on the axis oscillates; the origin rotates about it.
         let first = self.place + self.start * self.through;
         let (sin, cos) = (self.frequency * time).sin_cos();
-        let (way, rate) = match self.frequency > 0.0 {
-            true => ((1.0 - cos) / self.frequency, self.frequency * cos),
-            false => (0.0, 0.0),
+        let (way, rate) = if self.frequency > 0.0 {
+            ((1.0 - cos) / self.frequency, self.frequency * cos)
+        } else {
+            (0.0, 0.0)
         };
         let arm = axes * (self.origin - self.through);
         let omega = axes * self.omega;
@@ -188,9 +189,10 @@ impl Absolute {
         let forces = self.accelerations(time, state).1?;
         let held = self.conditions.as_ref()?;
         let frame = held.frame.at(time);
-        let elastic = match held.carries {
-            true => self.solid.carried_force(&state.x, &frame.axes),
-            false => self.solid.fitted_force(&state.x, &self.fit).0,
+        let elastic = if held.carries {
+            self.solid.carried_force(&state.x, &frame.axes)
+        } else {
+            self.solid.fitted_force(&state.x, &self.fit).0
         };
         let arm = |i: usize| frame.axes.tr_mul(&(node(&state.x, i) - frame.origin));
         let nodes = 0..self.solid.places.len();

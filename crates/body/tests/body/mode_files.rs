@@ -140,9 +140,10 @@ fn modes_of_another_model_are_told() {
 fn too_few_digits_are_told_from_another_model() {
     let model = model("modes");
     let mut modes = read(&model, &file("block.frd")).expect("modes");
-    let round = |value: f64| match value == 0.0 {
-        true => 0.0,
-        false => {
+    let round = |value: f64| {
+        if value == 0.0 {
+            0.0
+        } else {
             let unit = 10f64.powi(value.abs().log10().floor() as i32 - 1);
             (value / unit).round() * unit
         }

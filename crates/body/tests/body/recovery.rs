@@ -137,11 +137,10 @@ impl Statics {
         let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
         let nodes = raw.nodes.positions.clone();
         let n = k.nrows();
-        let taken: Vec<usize> = match rigid {
-            true => {
-                raw.data.interfaces.iter().flat_map(|set| &set.nodes).map(|id| *id as usize - 1).collect()
-            }
-            false => Vec::new(),
+        let taken: Vec<usize> = if rigid {
+            raw.data.interfaces.iter().flat_map(|set| &set.nodes).map(|id| *id as usize - 1).collect()
+        } else {
+            Vec::new()
         };
         let free: Vec<usize> = (0..n).filter(|row| !taken.contains(&(row / 3))).collect();
         let sets = if rigid { raw.data.interfaces.len() } else { 0 };

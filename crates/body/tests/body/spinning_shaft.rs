@@ -34,10 +34,7 @@ fn rayleigh(width: f64, spin: f64, [mut low, mut high]: [f64; 2]) -> f64 {
     assert!(ends(low) * ends(high) < 0.0, "one root between {low} and {high}");
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
-        match ends(low) * ends(middle) < 0.0 {
-            true => high = middle,
-            false => low = middle,
-        }
+        if ends(low) * ends(middle) < 0.0 { high = middle } else { low = middle }
     }
     0.5 * (low + high)
 }

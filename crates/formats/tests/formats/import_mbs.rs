@@ -167,19 +167,21 @@ fn each_fault_of_an_mbdyn_file_is_its_finding() {
     assert!(!found.is_empty() && found.iter().all(|(_, code)| *code == Code::AuditLayout), "{found:?}");
 
     // All numbers have six decimals, as written by %f.
-    let fixed = text.lines().map(|line| match line.starts_with("**") || line.starts_with("REV") {
-        true => line.to_owned(),
-        false => line
-            .split_whitespace()
-            .map(|word| {
-                if word.contains('.') {
-                    format!("{:.6}", word.parse::<f64>().expect("a number"))
-                } else {
-                    word.to_owned()
-                }
-            })
-            .collect::<Vec<_>>()
-            .join(" "),
+    let fixed = text.lines().map(|line| {
+        if line.starts_with("**") || line.starts_with("REV") {
+            line.to_owned()
+        } else {
+            line.split_whitespace()
+                .map(|word| {
+                    if word.contains('.') {
+                        format!("{:.6}", word.parse::<f64>().expect("a number"))
+                    } else {
+                        word.to_owned()
+                    }
+                })
+                .collect::<Vec<_>>()
+                .join(" ")
+        }
     });
     let found = of(&(fixed.collect::<Vec<_>>().join("\n") + "\n"));
     assert_eq!(found, [("digits", Digits)]);

@@ -2,7 +2,7 @@
 
 use super::variables::ExodusFile;
 use crate::hdf5::left_out;
-use flexbody_base::diagnostic::{Diagnosed, Diagnostic};
+use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 
 /// Refuses an Exodus file.

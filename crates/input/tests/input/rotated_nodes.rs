@@ -54,9 +54,8 @@ fn write_matrix(path: &Path, matrix: &Mat<f64>) {
 fn write_rotated(folder: &Path, raw: &RawModel, labels: &[(usize, usize)]) {
     let n = labels.len();
     // u_file = A u.
-    let a = Mat::from_fn(n, n, |i, j| match labels[i].0 == labels[j].0 {
-        true => axes(ANGLES[labels[i].0])[(labels[j].1, labels[i].1)],
-        false => 0.0,
+    let a = Mat::from_fn(n, n, |i, j| {
+        if labels[i].0 == labels[j].0 { axes(ANGLES[labels[i].0])[(labels[j].1, labels[i].1)] } else { 0.0 }
     });
     for (name, own, scale) in
         [("K.mtx", &raw.stiffness, 1.0), ("M.mtx", &raw.mass, 1.0), ("D.mtx", &raw.stiffness, 1e-5)]

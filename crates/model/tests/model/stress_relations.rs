@@ -141,9 +141,12 @@ fn loads(body: &Body) -> Vec<(LoadKind, usize, DVector<f64>)> {
         all.push((LoadKind::Moment(tip()), k, at_tip(body, Vector3::zeros(), e(k))));
     }
     for (component, (k, l)) in LoadKind::SPIN.into_iter().enumerate() {
-        let pair = |x: Vector3<f64>| match k == l {
-            true => e(k).cross(&e(k).cross(&x)),
-            false => e(k).cross(&e(l).cross(&x)) + e(l).cross(&e(k).cross(&x)),
+        let pair = |x: Vector3<f64>| {
+            if k == l {
+                e(k).cross(&e(k).cross(&x))
+            } else {
+                e(k).cross(&e(l).cross(&x)) + e(l).cross(&e(k).cross(&x))
+            }
         };
         all.push((LoadKind::Spin, component, body.inertia(3, |x| pair(x - centre))));
         // Spin about another point, like with `--frame model`.

@@ -129,9 +129,8 @@ impl Points {
             give(
                 LoadKind::Spin,
                 component,
-                self.weighted(|x| match k == l {
-                    true => e.cross(&e.cross(x)),
-                    false => e.cross(&f.cross(x)) + f.cross(&e.cross(x)),
+                self.weighted(|x| {
+                    if k == l { e.cross(&e.cross(x)) } else { e.cross(&f.cross(x)) + f.cross(&e.cross(x)) }
                 }),
             );
         }

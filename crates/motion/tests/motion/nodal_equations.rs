@@ -370,9 +370,10 @@ fn accelerations_apart(
     reduced_loads(amplitude, &own, &mut forces);
     own.accelerations(&forces, &mut expected).expect("accelerations");
     let lifted = lifting.lift(&Configuration { q: expected.split_off(reduced.n_rigid()), ..state });
-    let found: Vec<f64> = match nf + 3 == reduced.n_velocities() {
-        true => vec![linear.x, linear.y, angular.z],
-        false => linear.iter().chain(&angular).copied().collect(),
+    let found: Vec<f64> = if nf + 3 == reduced.n_velocities() {
+        vec![linear.x, linear.y, angular.z]
+    } else {
+        linear.iter().chain(&angular).copied().collect()
     };
     let half = found.len().div_ceil(2);
     let weighted = |x: &DVector<f64>| {

@@ -47,9 +47,10 @@ fn radius(body: &FlexBody) -> f64 {
 fn spinning(body: &FlexBody, spin: f64) -> Configuration {
     let rate = spin * body.modes().eigenvalue[0].sqrt();
     let plane = body.dimension() == 2;
-    let (axis, flight) = match plane {
-        true => (Vector3::z(), Vector3::new(0.2, 0.5, 0.0)),
-        false => (Vector3::new(0.1, 1.0, 0.05), Vector3::new(0.2, 0.5, -0.4)),
+    let (axis, flight) = if plane {
+        (Vector3::z(), Vector3::new(0.2, 0.5, 0.0))
+    } else {
+        (Vector3::new(0.1, 1.0, 0.05), Vector3::new(0.2, 0.5, -0.4))
     };
     let nf = body.n_modes();
     Configuration {

@@ -59,11 +59,10 @@ impl AllNodes<'_> {
         let mut places = DMatrix::zeros(n, 3);
         for i in 0..n {
             let start = self.start(i);
-            let place = match self.block.rigid.contains(&i) {
-                true => at + moved + Rotation3::new(turned) * (start - at),
-                false => {
-                    start + Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * i + k, j)] * q[j]).sum())
-                }
+            let place = if self.block.rigid.contains(&i) {
+                at + moved + Rotation3::new(turned) * (start - at)
+            } else {
+                start + Vector3::from_fn(|k, _| (0..q.len()).map(|j| shape[(3 * i + k, j)] * q[j]).sum())
             };
             places.set_row(i, &place.transpose());
         }
@@ -79,9 +78,10 @@ impl AllNodes<'_> {
         let n = self.block.positions.len();
         let mut mode = DMatrix::zeros(n, 3);
         for i in 0..n {
-            let own = match self.block.rigid.contains(&i) {
-                true => moved + turned.cross(&(self.start(i) - at)),
-                false => Vector3::from_fn(|k, _| shape[(3 * i + k, j)]),
+            let own = if self.block.rigid.contains(&i) {
+                moved + turned.cross(&(self.start(i) - at))
+            } else {
+                Vector3::from_fn(|k, _| shape[(3 * i + k, j)])
             };
             mode.set_row(i, &own.transpose());
         }
@@ -206,12 +206,11 @@ fn the_stiffness_of_inertia_is_what_a_finite_rotation_of_the_region_does() {
             });
             for (component, (k, l)) in LoadKind::SPIN.into_iter().enumerate() {
                 let taken = quadratic(&stiffness(&body, LoadKind::Spin, component));
-                match k == l {
-                    true => found[(k, k)] -= taken,
-                    false => {
-                        found[(k, l)] -= 0.5 * taken;
-                        found[(l, k)] -= 0.5 * taken;
-                    }
+                if k == l {
+                    found[(k, k)] -= taken
+                } else {
+                    found[(k, l)] -= 0.5 * taken;
+                    found[(l, k)] -= 0.5 * taken;
                 }
             }
             found = (found + found.transpose()) * 0.5;

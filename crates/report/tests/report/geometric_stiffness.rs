@@ -83,9 +83,12 @@ impl Case {
         let matrix = |&(k, l): &(usize, usize)| {
             let e = |axis: usize| Vector3::ith(axis, 1.0);
             // The coefficient of w_k w_l in w x (w x x).
-            self.stressed(&self.inertia_load(|x| match k == l {
-                true => e(k).cross(&e(k).cross(&x)),
-                false => e(k).cross(&e(l).cross(&x)) + e(l).cross(&e(k).cross(&x)),
+            self.stressed(&self.inertia_load(|x| {
+                if k == l {
+                    e(k).cross(&e(k).cross(&x))
+                } else {
+                    e(k).cross(&e(l).cross(&x)) + e(l).cross(&e(k).cross(&x))
+                }
             }))
         };
         SPIN.iter().enumerate().map(|(c, pair)| given(LoadKind::Spin, c, matrix(pair))).collect()

@@ -279,14 +279,15 @@ fn a_named_load_of_a_unit_force_is_the_interface_load() {
     scene.initial.angular_velocity = Vector3::new(0.1, 0.2, -0.1) * rate;
     let mut runs = Vec::new();
     for named in [true, false] {
-        scene.loads = vec![match named {
-            true => Load::named("pull", history.clone()),
-            false => Load {
+        scene.loads = vec![if named {
+            Load::named("pull", history.clone())
+        } else {
+            Load {
                 at: Point::Interface("tip".to_owned()),
                 force: VectorHistory::Along { direction, factor: history.clone() },
                 torque: VectorHistory::nothing(),
                 axes: Axes::Model,
-            },
+            }
         }];
         runs.push(simulate(&few, &scene, &Context::QUIET).expect("a run").0);
     }

@@ -180,9 +180,10 @@ fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<C
     }
     let plane = model.dimension() == 2;
     let ids = &model.nodes().ids;
-    let by = match model.interfaces().is_empty() {
-        true => Point::Node(ids[pick(random, ids.len() as u64) as usize]),
-        false => Point::Interface("root".to_owned()),
+    let by = if model.interfaces().is_empty() {
+        Point::Node(ids[pick(random, ids.len() as u64) as usize])
+    } else {
+        Point::Interface("root".to_owned())
     };
     let kind = pick(random, 3);
     let turn = if plane { Vector3::z() } else { Vector3::from(random.vector::<3>()).normalize() };
