@@ -1,0 +1,138 @@
+//! Elements, materials and constraints of a model as its deck describes them, before anything of it is proved.
+
+use crate::Elasticity;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Node and direction, 1 to 6, of a degree of freedom.
+pub type NodeDirection = (i64, u8);
+
+/// Elements, materials and constraints of a deck.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DescribedElements {
+    /// Elements with the same type and section.
+    pub groups: Vec<ElementGroup>,
+    /// Positions of the nodes of all elements, also of nodes without rows in the stiffness matrix.
+    pub positions: BTreeMap<i64, [f64; 3]>,
+    /// Springs and other parts of the stiffness that the deck states as numbers.
+    pub direct: Vec<NodeStiffness>,
+    /// Degrees of freedom that have no row in the stiffness matrix, since they follow from others.
+    pub equations: Vec<Equation>,
+    /// Parts of the deck that contribute to the stiffness and are not described here.
+    pub not_described: Vec<NotDescribed>,
+    /// Deck, for messages.
+    pub path: PathBuf,
+}
+
+/// Elements with the same type and section.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElementGroup {
+    /// Type in upper case, as the program names it: `C3D20R`.
+    pub kind: String,
+    /// Material and its axes.
+    pub section: Section,
+    /// Numbers of the elements.
+    pub ids: Vec<i64>,
+    /// Nodes of all elements, those of each element in the order of the program.
+    pub nodes: Vec<i64>,
+    /// Numbers of the nodes inside the elements that have rows in the stiffness matrix but are not in the deck, the same
+    /// number for each element; empty if there are none.
+    pub internal: Vec<i64>,
+}
+
+/// Section of solid elements: their material and its axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// Name of the material.
+    pub material: String,
+    /// Elasticity along the axes of the section.
+    pub elasticity: Elasticity,
+    /// Axes of the material.
+    pub axes: Axes,
+}
+
+/// Axes of a material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Axes {
+    /// Those of the model.
+    Model,
+    /// The same everywhere: the columns, along the axes of the model.
+    Fixed(Matrix3<f64>),
+    /// Radius, circumference and axis of a cylinder, about the line through two points.
+    Cylinder {
+        /// Point on the axis.
+        from: Vector3<f64>,
+        /// Another point on the axis, in its direction.
+        to: Vector3<f64>,
+    },
+}
+
+/// Stiffness of some degrees of freedom that the deck states as numbers: a spring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeStiffness {
+    /// Element, in words: `spring 12`.
+    pub name: String,
+    /// Degrees of freedom.
+    pub rows: Vec<NodeDirection>,
+    /// Matrix by `rows`, row by row.
+    pub matrix: Vec<f64>,
+}
+
+/// Linear equation that an FE program has eliminated: u(dependent) = sum of factors times u.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equation {
+    /// Degree of freedom without a row.
+    pub dependent: NodeDirection,
+    /// Degrees of freedom that it follows, with their factors; these may be dependent themselves.
+    pub terms: Vec<(NodeDirection, f64)>,
+}
+
+/// Part of a deck that contributes to the stiffness and is not described.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NotDescribed {
+    /// In words, with the reason: `12 elements of type S8R: shells are not proved yet`.
+    pub what: String,
+    /// Line of the deck, if it is one.
+    pub line: Option<usize>,
+    /// Nodes that it touches; empty if they are unknown.
+    pub nodes: Vec<i64>,
+}
+
+impl Axes {
+    /// Returns the axes at a position as columns, along the axes of the model; `None` on the axis of a cylinder.
+    pub fn at(&self, x: &Vector3<f64>) -> Option<Matrix3<f64>> {
+        match self {
+            Self::Model => Some(Matrix3::identity()),
+            Self::Fixed(axes) => Some(*axes),
+            Self::Cylinder { from, to } => {
+                let along = (to - from).try_normalize(0.0)?;
+                let arm = x - from;
+                let radius = (arm - along * along.dot(&arm)).try_normalize(f64::MIN_POSITIVE)?;
+                Some(Matrix3::from_columns(&[radius, along.cross(&radius), along]))
+            }
+        }
+    }
+}
+
+impl Section {
+    /// Returns the elasticity along the axes of the model at a position; `None` where the section has no axes.
+    pub fn elasticity_at(&self, x: &Vector3<f64>) -> Option<Elasticity> {
+        match self.axes {
+            Axes::Model => Some(self.elasticity),
+            _ => Some(self.elasticity.turned(&self.axes.at(x)?)),
+        }
+    }
+}
+
+impl ElementGroup {
+    /// Returns number, nodes and internal nodes of each element.
+    pub fn elements(&self) -> impl Iterator<Item = (i64, &[i64], &[i64])> {
+        let count = self.ids.len().max(1);
+        let (nodes, internal) = (self.nodes.len() / count, self.internal.len() / count);
+        self.ids.iter().enumerate().map(move |(at, id)| {
+            let (own, inner) = (at * nodes..(at + 1) * nodes, at * internal..(at + 1) * internal);
+            (*id, &self.nodes[own], &self.internal[inner])
+        })
+    }
+}
