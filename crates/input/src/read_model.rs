@@ -135,6 +135,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         geometric_stiffness,
         recoveries,
         named_loads,
+        elements: None,
         sources: Sources::default(),
     };
     let model = RawModel {

@@ -7,6 +7,7 @@ pub(crate) mod element_around;
 pub(crate) mod inertial_rows;
 pub(crate) mod layout;
 pub(crate) mod origin;
+pub(crate) mod proved_elements;
 pub(crate) mod raw;
 pub(crate) mod references;
 pub(crate) mod soft_rotations;
@@ -21,6 +22,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
+use flexbody_elements::ProvedElements;
 use flexbody_linalg::{CscMatrix, EliminationOrder, Pencil, SymmetricMatrix, larger};
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
@@ -56,6 +58,8 @@ pub struct FeModel {
     followers: Option<Arc<Followers>>,
     /// M on points and directors, computed on demand.
     director_mass: OnceLock<Option<Arc<DirectorMass>>>,
+    /// Elements that K proves, or the reasons why it does not, found on demand.
+    proved: OnceLock<std::result::Result<Arc<ProvedElements>, Vec<Diagnostic>>>,
 }
 
 impl FeModel {
@@ -82,6 +86,7 @@ impl FeModel {
             elimination: EliminationOrder::default(),
             followers: None,
             director_mass: OnceLock::new(),
+            proved: OnceLock::new(),
         }
     }
 

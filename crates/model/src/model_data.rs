@@ -2,6 +2,8 @@
 
 use crate::{Damping, Description, GeometricStiffness, ModelLoad, ModelRecovery, NodeSet, SurfaceMesh};
 use flexbody_base::provenance::Sources;
+use flexbody_elements::DescribedElements;
+use std::sync::Arc;
 
 /// Data of a model other than K, M, nodes and rows. `M` is the type of its matrices: [`RawMatrix`](crate::RawMatrix) as
 /// read, [`SymmetricMatrix`](flexbody_linalg::SymmetricMatrix) after the checks.
@@ -22,6 +24,8 @@ pub struct ModelData<M> {
     pub recoveries: Vec<ModelRecovery>,
     /// Nodal forces with a name, by the rows of the files as read, and by internal rows after the checks.
     pub named_loads: Vec<ModelLoad>,
+    /// Elements, materials and constraints as the deck describes them, if they were asked for.
+    pub elements: Option<Arc<DescribedElements>>,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`,
     /// `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Sources,
@@ -38,6 +42,7 @@ impl<M> ModelData<M> {
             geometric_stiffness: Vec::new(),
             recoveries: Vec::new(),
             named_loads: Vec::new(),
+            elements: None,
             sources: Sources::default(),
         }
     }

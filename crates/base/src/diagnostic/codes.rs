@@ -315,6 +315,8 @@ codes! {
         "Under uniform strain all points of a homogeneous solid have one stress, which K gives: s : E V = u'K u. The rows give another.";
     RecoveryUncompared = "FB461", Note, Done, "stresses of a recovery were not compared with the stiffness, or only along other axes", "nothing to do; compare stresses under one load with those of the FE program",
         "Under uniform strain K is not that of a homogeneous solid, a point lacks components, or its stresses are along axes of elements.";
+    ElementsUnproved = "FB462", Error, BadInput, "the stiffness of the elements in the deck is not K, or not known", "give the deck that K was written with, unchanged; or take stress and its stiffness from the FE program: `flexbody shapes`, and [[geometric_stiffness]] of the manifest",
+        "Stress and stress stiffness are computed from the elements of the deck only if their assembled stiffness is K, entry by entry. It is not, or some elements, materials or constraints of the deck are not read.";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts",
         "The residuals of some modes stay above the accuracy after the largest number of restarts.";

@@ -188,6 +188,7 @@ fn body_model(
         geometric_stiffness,
         recoveries: recoveries_of_body(&all.recoveries, kept, &nodes),
         named_loads: loads_of_body(&all.named_loads, kept),
+        elements: all.elements.clone(),
         sources: all.sources.clone(),
     };
     Assembled {

@@ -212,6 +212,7 @@ impl InternalOrder<'_> {
             geometric_stiffness,
             recoveries,
             named_loads,
+            elements: given.elements.take(),
             sources: std::mem::take(&mut given.sources),
         }
     }

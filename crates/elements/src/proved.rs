@@ -1,0 +1,180 @@
+//! Elements that the stiffness matrix proves: stress stiffness and stresses.
+
+use crate::places::{Place, Places};
+use crate::{DescribedElements, ElementGroup, Formulation};
+use faer::{Mat, MatRef};
+use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
+use std::collections::BTreeSet;
+
+/// Elements of a parallel task.
+const ELEMENTS_PER_TASK: usize = 64;
+
+/// Elements whose matrices are in memory at a time.
+const ELEMENTS_AT_ONCE: usize = 8192;
+
+/// Nodes of a parallel task.
+const NODES_PER_TASK: usize = 1024;
+
+/// Elements whose assembled stiffness is the stiffness of the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProvedElements {
+    described: DescribedElements,
+    /// Formulation of each group.
+    formulations: Vec<Formulation>,
+    places: Places,
+    /// Number of rows of the stiffness.
+    rows: usize,
+    /// Elements with their nodes in `places`, those of the groups one after the other.
+    members: Vec<Member>,
+    /// Nodes that share an element with each node, ascending, as columns of a matrix.
+    neighbours: Neighbours,
+}
+
+/// Element of a group, with its nodes in `Places`: those of the deck, then those inside.
+#[derive(Debug, Clone, PartialEq)]
+struct Member {
+    group: u32,
+    nodes: Vec<u32>,
+}
+
+/// Pattern of a symmetric matrix with one row per node.
+#[derive(Debug, Clone, PartialEq)]
+struct Neighbours {
+    pointers: Vec<usize>,
+    nodes: Vec<u32>,
+}
+
+impl ProvedElements {
+    pub(crate) fn new(
+        described: DescribedElements,
+        formulations: Vec<Formulation>,
+        places: Places,
+        rows: usize,
+    ) -> Self {
+        let mut members = Vec::new();
+        for (group, of) in described.groups.iter().enumerate() {
+            members.extend(of.elements().map(|(_, nodes, inside)| Member {
+                group: group as u32,
+                nodes: nodes.iter().chain(inside).map(|node| places.index(*node) as u32).collect(),
+            }));
+        }
+        let neighbours = Neighbours::of(&members, places.nodes.len());
+        Self { described, formulations, places, rows, members, neighbours }
+    }
+
+    /// Returns the groups of elements with their formulations.
+    pub fn groups(&self) -> impl Iterator<Item = (&ElementGroup, Formulation)> {
+        self.described.groups.iter().zip(self.formulations.iter().copied())
+    }
+
+    /// Returns the number of nodes of elements, those inside elements included.
+    pub fn n_nodes(&self) -> usize {
+        self.places.nodes.len()
+    }
+
+    /// Returns the displacements of the nodes of elements (3 x nodes rows, node by node) for displacements of all rows of the
+    /// stiffness (N x c).
+    ///
+    /// # Panics
+    /// If `x` has another number of rows than the stiffness.
+    pub fn displacements(&self, x: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(x.nrows(), self.rows, "rows of the stiffness");
+        Mat::from_fn(3 * self.n_nodes(), x.ncols(), |at, column| {
+            self.places.of_nodes[at / 3][at % 3].value(|row| x[(row, column)])
+        })
+    }
+
+    /// Returns the stiffness g of the stress that displacements cause, a matrix with one row per node of the elements: the
+    /// stress stiffness is its Kronecker product with I3,
+    ///
+    /// g_ab = sum over points of w det J grad N_a' s grad N_b.
+    ///
+    /// * `displacements`: of the nodes of elements, three for each.
+    ///
+    /// # Panics
+    /// If the number of displacements is not three for each node.
+    pub fn stress_stiffness(&self, displacements: &[f64]) -> SymmetricMatrix {
+        assert_eq!(displacements.len(), 3 * self.n_nodes(), "three displacements per node");
+        let mut values = vec![0.0; self.neighbours.nodes.len()];
+        for part in self.members.chunks(ELEMENTS_AT_ONCE) {
+            let matrices =
+                parallel::values(part.len(), ELEMENTS_PER_TASK, |at| self.stiffness_of(&part[at], displacements));
+            for (member, matrix) in part.iter().zip(matrices) {
+                for (&row, of_row) in member.nodes.iter().zip(matrix.chunks(member.nodes.len())) {
+                    for (&column, value) in member.nodes.iter().zip(of_row) {
+                        values[self.neighbours.place(row, column)] += value;
+                    }
+                }
+            }
+        }
+        let n = self.n_nodes();
+        let matrix = CscMatrix::from_parts(
+            n,
+            n,
+            self.neighbours.pointers.clone(),
+            self.neighbours.nodes.clone(),
+            values,
+        );
+        SymmetricMatrix::symmetrised(matrix.expect("neighbours are ascending"))
+    }
+
+    /// Returns the stress stiffness of an element, row by row.
+    fn stiffness_of(&self, member: &Member, displacements: &[f64]) -> Vec<f64> {
+        let (formulation, group) = (self.formulations[member.group as usize], member.group as usize);
+        let at = |node: &u32| 3 * *node as usize;
+        let moved: Vec<[f64; 3]> =
+            member.nodes.iter().map(|node| std::array::from_fn(|k| displacements[at(node) + k])).collect();
+        let positions = self.positions_of(member);
+        let section = &self.described.groups[group].section;
+        let stresses = formulation.stresses(&positions, &moved, section);
+        let matrix = stresses.and_then(|stresses| formulation.geometric_stiffness(&positions, &stresses));
+        matrix.expect("elements with a stiffness have stresses")
+    }
+
+    fn positions_of(&self, member: &Member) -> Vec<[f64; 3]> {
+        let count = self.formulations[member.group as usize].n_nodes();
+        member.nodes[..count].iter().map(|node| self.places.positions[*node as usize]).collect()
+    }
+
+    /// Returns the Kronecker product of a matrix by nodes and I3 in the rows of the stiffness: nodes without rows follow their
+    /// equations.
+    pub fn in_rows(&self, by_nodes: &SymmetricMatrix) -> SymmetricMatrix {
+        let mut entries = Vec::with_capacity(3 * by_nodes.as_csc().nnz());
+        for a in 0..by_nodes.n() {
+            let (columns, values) = by_nodes.row(a);
+            for (&b, &value) in columns.iter().zip(values) {
+                for k in 0..3 {
+                    let (row, column) = (&self.places.of_nodes[a][k], &self.places.of_nodes[b as usize][k]);
+                    row.for_each(|i, left| column.for_each(|j, right| entries.push((i, j, left * value * right))));
+                }
+            }
+        }
+        SymmetricMatrix::symmetrised(CscMatrix::from_triplets(self.rows, self.rows, &entries))
+    }
+}
+
+impl Neighbours {
+    fn of(members: &[Member], count: usize) -> Self {
+        let mut of_nodes: Vec<Vec<u32>> = vec![Vec::new(); count];
+        for (at, member) in members.iter().enumerate() {
+            member.nodes.iter().for_each(|node| of_nodes[*node as usize].push(at as u32));
+        }
+        let lists = parallel::values(count, NODES_PER_TASK, |node| {
+            let nodes = of_nodes[node].iter().flat_map(|at| &members[*at as usize].nodes);
+            nodes.copied().collect::<BTreeSet<u32>>().into_iter().collect::<Vec<u32>>()
+        });
+        let mut pointers = vec![0];
+        let mut nodes = Vec::new();
+        for list in lists {
+            nodes.extend(list);
+            pointers.push(nodes.len());
+        }
+        Self { pointers, nodes }
+    }
+
+    /// Returns the place of an entry.
+    fn place(&self, row: u32, column: u32) -> usize {
+        let (from, to) = (self.pointers[row as usize], self.pointers[row as usize + 1]);
+        from + self.nodes[from..to].binary_search(&column).expect("nodes of one element are neighbours")
+    }
+}
