@@ -9,8 +9,18 @@
 
 mod described;
 mod elasticity;
+mod extrapolation;
+mod formulation;
+mod geometric;
+mod geometry;
+mod rule;
+mod shape;
+mod stiffness;
+mod stress;
 
 pub use described::{
     Axes, DescribedElements, ElementGroup, Equation, NodeDirection, NodeStiffness, NotDescribed, Section,
 };
 pub use elasticity::Elasticity;
+pub use formulation::Formulation;
+pub use geometry::PointVolume;

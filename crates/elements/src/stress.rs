@@ -1,0 +1,133 @@
+//! Strains and stresses at the points of an element and at its nodes, and the forces of stresses.
+
+use crate::Section;
+use crate::formulation::Formulation;
+use crate::geometry::Point;
+use crate::stiffness::Material;
+use nalgebra::Vector6;
+
+/// Positions of the components of a tensor in its vector xx, yy, zz, xy, yz, xz.
+const PLACES: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+
+impl Formulation {
+    /// Returns the strains xx, yy, zz, xy, yz, xz (engineering shear) at each point for displacements of nodes and internal
+    /// nodes; `None` if the element is inverted or degenerate at a point.
+    ///
+    /// # Panics
+    /// If the number of nodes is another one.
+    pub fn strains(self, x: &[[f64; 3]], u: &[[f64; 3]]) -> Option<Vec<[f64; 6]>> {
+        self.check_functions(u.len());
+        Some(self.geometry(x)?.iter().map(|point| point.strain(u)).collect())
+    }
+
+    /// Returns the stresses xx, yy, zz, xy, yz, xz at each point for displacements of nodes and internal nodes; `None` if
+    /// the element is inverted or degenerate at a point, or if the section has no axes there.
+    ///
+    /// # Panics
+    /// If the number of nodes is another one.
+    pub fn stresses(self, x: &[[f64; 3]], u: &[[f64; 3]], section: &Section) -> Option<Vec<[f64; 6]>> {
+        self.check_functions(u.len());
+        let material = Material::new(section)?;
+        let stress = |point: &Point| {
+            let strain = Vector6::from(point.strain(u));
+            Some((material.at(point.position)? * strain).into())
+        };
+        self.geometry(x)?.iter().map(stress).collect()
+    }
+
+    /// Returns the rows of the stresses at the points: six for each point, each with three columns for each node and
+    /// internal node. Returns `None` where [`Formulation::stresses`] does.
+    ///
+    /// # Panics
+    /// If the number of nodes is another one.
+    pub fn stress_rows(self, x: &[[f64; 3]], section: &Section) -> Option<Vec<Vec<f64>>> {
+        let material = Material::new(section)?;
+        let mut rows = Vec::with_capacity(6 * self.n_points());
+        for point in self.geometry(x)? {
+            let elasticity = material.at(point.position)?;
+            let columns: Vec<Vector6<f64>> = (0..3 * self.n_functions())
+                .map(|column| elasticity * Vector6::from(point.unit_strain(column / 3, column % 3)))
+                .collect();
+            rows.extend((0..6).map(|row| columns.iter().map(|column| column[row]).collect::<Vec<f64>>()));
+        }
+        Some(rows)
+    }
+
+    /// Returns the rows of the stresses at the nodes, extrapolated from the points: six for each node, otherwise as
+    /// [`Formulation::stress_rows`].
+    ///
+    /// # Panics
+    /// If the number of nodes is another one.
+    pub fn nodal_stress_rows(self, x: &[[f64; 3]], section: &Section) -> Option<Vec<Vec<f64>>> {
+        let points = self.stress_rows(x, section)?;
+        let columns = 3 * self.n_functions();
+        let mut rows = Vec::with_capacity(6 * self.n_nodes());
+        for weights in self.nodal_extrapolation() {
+            for component in 0..6 {
+                let mut row = vec![0.0; columns];
+                for (p, weight) in weights.iter().enumerate() {
+                    for (sum, value) in row.iter_mut().zip(&points[6 * p + component]) {
+                        *sum += weight * value;
+                    }
+                }
+                rows.push(row);
+            }
+        }
+        Some(rows)
+    }
+
+    /// Returns the forces at nodes and internal nodes with which stresses at the points are in equilibrium: the sum over
+    /// points of volume times B' stress. The stiffness times displacements has the same forces, and those of the hourglass
+    /// control where there is one. Returns `None` if the element is inverted or degenerate at a point.
+    ///
+    /// # Panics
+    /// If the number of nodes or points is another one.
+    pub fn forces(self, x: &[[f64; 3]], stresses: &[[f64; 6]]) -> Option<Vec<[f64; 3]>> {
+        assert_eq!(stresses.len(), self.n_points(), "stresses of an element: {}", self.name());
+        let mut forces = vec![[0.0; 3]; self.n_functions()];
+        for (point, stress) in self.geometry(x)?.iter().zip(stresses) {
+            for (node, force) in forces.iter_mut().enumerate() {
+                for (direction, component) in force.iter_mut().enumerate() {
+                    let strain = point.unit_strain(node, direction);
+                    let work: f64 = strain.iter().zip(stress).map(|(strain, stress)| strain * stress).sum();
+                    *component += point.volume * work;
+                }
+            }
+        }
+        Some(forces)
+    }
+
+    /// Checks the number of displacements.
+    fn check_functions(self, count: usize) {
+        assert_eq!(count, self.n_functions(), "displacements of an element: {}", self.name());
+    }
+}
+
+impl Point {
+    /// Returns the strain for a unit displacement of a node in a direction.
+    fn unit_strain(&self, node: usize, direction: usize) -> [f64; 6] {
+        let mut strain = [0.0; 6];
+        for (place, row) in PLACES[direction].into_iter().zip(&self.gradients) {
+            strain[place] += row[node];
+        }
+        if let Some(dilation) = &self.dilation {
+            for normal in &mut strain[..3] {
+                *normal += dilation[direction][node];
+            }
+        }
+        strain
+    }
+
+    /// Returns the strain for displacements of all functions.
+    fn strain(&self, u: &[[f64; 3]]) -> [f64; 6] {
+        let mut strain = [0.0; 6];
+        for (node, displacement) in u.iter().enumerate() {
+            for (direction, size) in displacement.iter().enumerate() {
+                for (sum, unit) in strain.iter_mut().zip(self.unit_strain(node, direction)) {
+                    *sum += size * unit;
+                }
+            }
+        }
+        strain
+    }
+}
