@@ -459,7 +459,7 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
         ReferenceConditions::Interface(_) => -body.invariants().first_moment() / body.invariants().mass(),
         _ => Vector3::zeros(),
     };
-    let (mut found, rotated) = modal_geometric_stiffness(model, shapes, body.frame(), &shift)?;
+    let (mut found, rotated) = modal_geometric_stiffness(model, shapes, Vec::new(), body.frame(), &shift)?;
     let (mut stored, mut shapes) = (body.geometric_stiffness().to_vec(), shapes.clone());
     let stored_rotated = &body.parts().rotated_stiffness;
     if !stored_rotated.is_empty() {

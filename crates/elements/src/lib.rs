@@ -8,11 +8,15 @@
 )]
 
 mod described;
+mod difference;
 mod elasticity;
 mod extrapolation;
 mod formulation;
 mod geometric;
 mod geometry;
+mod places;
+mod proof;
+mod proved;
 mod rule;
 mod shape;
 mod stiffness;
@@ -24,3 +28,5 @@ pub use described::{
 pub use elasticity::Elasticity;
 pub use formulation::Formulation;
 pub use geometry::PointVolume;
+pub use proof::{Refusal, prove};
+pub use proved::ProvedElements;

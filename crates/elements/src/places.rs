@@ -50,7 +50,8 @@ impl Places {
                 Place::Follows(Vec::new())
             })
         };
-        let of_nodes = nodes.iter().map(|&node| [1, 2, 3].map(|direction| place((node, direction)))).collect();
+        let of_nodes =
+            nodes.iter().map(|&node| [1, 2, 3].map(|direction| place((node, direction)))).collect();
         let index = nodes.iter().copied().zip(0..).collect();
         if missing.is_empty() { Ok(Self { nodes, positions, of_nodes, index }) } else { Err(missing) }
     }
@@ -109,12 +110,14 @@ impl<'d> Rows<'d> {
             return Some(());
         }
         let equation = self.equations.get(&at).filter(|_| depth < MAX_DEPTH)?;
-        equation.terms.iter().try_for_each(|&(next, own)| self.add_terms(next, factor * own, depth + 1, terms))
+        equation
+            .terms
+            .iter()
+            .try_for_each(|&(next, own)| self.add_terms(next, factor * own, depth + 1, terms))
     }
 }
 
 impl Place {
-
     /// Calls `with` with each row and its factor.
     pub(crate) fn for_each(&self, mut with: impl FnMut(u32, f64)) {
         match self {

@@ -85,16 +85,18 @@ pub enum Refusal {
 /// # Errors
 /// Every reason why the elements are not proved.
 pub fn prove(
-    described: DescribedElements,
+    mut described: DescribedElements,
     stiffness: &SymmetricMatrix,
     labels: &[NodeDirection],
     digits: u8,
 ) -> Result<ProvedElements, Vec<Refusal>> {
-    let mut refusals: Vec<Refusal> = described.not_described.iter().cloned().map(Refusal::NotDescribed).collect();
+    let mut refusals: Vec<Refusal> =
+        described.not_described.iter().cloned().map(Refusal::NotDescribed).collect();
     refusals.extend(unknown_types(&described));
     if !refusals.is_empty() {
         return Err(refusals);
     }
+    described.groups.iter_mut().for_each(order_nodes);
     let places = Places::of(&described, labels).map_err(|missing| vec![Refusal::WithoutRow(missing)])?;
     let allowed = MAX_DIFFERENCE.max(ROUNDED_UNITS * 10f64.powi(1 - i32::from(digits)));
     let whole = Whole { described: &described, places: &places, stiffness, labels };
@@ -123,6 +125,14 @@ fn unknown_types(described: &DescribedElements) -> Vec<Refusal> {
         count,
     };
     unknown.into_iter().map(refusal).collect()
+}
+
+/// Puts the nodes of the elements of a group into the order of the formulations.
+fn order_nodes(group: &mut ElementGroup) {
+    let (kind, count) = kind_of(group);
+    let Some(order) = Formulation::node_order(kind, count) else { return };
+    let ordered = |nodes: &[i64]| order.iter().map(|&at| nodes[at]).collect::<Vec<i64>>();
+    group.nodes = group.nodes.chunks(count.max(1)).flat_map(ordered).collect();
 }
 
 /// Returns the formulations that elements of a group may have.
@@ -215,7 +225,9 @@ impl<'a> Whole<'a> {
         for &formulation in candidates {
             let mut sums: BTreeMap<(u32, u32), f64> = BTreeMap::new();
             for member in &members {
-                let Some(matrix) = formulation.stiffness(&member.positions, &member.group.section) else { continue };
+                let Some(matrix) = formulation.stiffness(&member.positions, &member.group.section) else {
+                    continue;
+                };
                 let places = self.places_of(member);
                 for (a, place) in places.iter().enumerate() {
                     let Place::Row(row) = place else { continue };
@@ -224,7 +236,9 @@ impl<'a> Whole<'a> {
                     }
                     for (b, other) in places.iter().enumerate() {
                         let value = matrix[a * places.len() + b];
-                        other.for_each(|column, factor| *sums.entry((*row, column)).or_default() += factor * value);
+                        other.for_each(|column, factor| {
+                            *sums.entry((*row, column)).or_default() += factor * value
+                        });
                     }
                 }
             }
@@ -243,7 +257,11 @@ impl<'a> Whole<'a> {
     ///
     /// # Errors
     /// Elements that are degenerate, and those whose stiffness is not that in the matrix.
-    fn compare(&self, formulations: &HashMap<Kind<'_>, Formulation>, allowed: f64) -> Result<(), Vec<Refusal>> {
+    fn compare(
+        &self,
+        formulations: &HashMap<Kind<'_>, Formulation>,
+        allowed: f64,
+    ) -> Result<(), Vec<Refusal>> {
         let mut difference = Difference::new(self.stiffness);
         let mut degenerate = Vec::new();
         // Elements, a part of them at a time.
@@ -295,7 +313,11 @@ impl<'a> Whole<'a> {
     }
 
     /// Returns the elements that differ from the stiffness, by the entries that are left.
-    fn named(&self, formulations: &HashMap<Kind<'_>, Formulation>, apart: &HashMap<(u32, u32), f64>) -> Vec<Refusal> {
+    fn named(
+        &self,
+        formulations: &HashMap<Kind<'_>, Formulation>,
+        apart: &HashMap<(u32, u32), f64>,
+    ) -> Vec<Refusal> {
         let touched: BTreeSet<u32> = apart.keys().flat_map(|&(row, column)| [row, column]).collect();
         let mut refusals = Vec::new();
         for group in &self.described.groups {
@@ -303,7 +325,8 @@ impl<'a> Whole<'a> {
             let (mut ids, mut largest) = (Vec::new(), 0.0f64);
             self.with_matrices(group, formulation, |member, matrix| {
                 let places = self.places_of(member);
-                let is_touched = places.iter().any(|place| matches!(place, Place::Row(row) if touched.contains(row)));
+                let is_touched =
+                    places.iter().any(|place| matches!(place, Place::Row(row) if touched.contains(row)));
                 if !is_touched {
                     return;
                 }

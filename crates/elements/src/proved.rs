@@ -1,6 +1,6 @@
 //! Elements that the stiffness matrix proves: stress stiffness and stresses.
 
-use crate::places::{Place, Places};
+use crate::places::Places;
 use crate::{DescribedElements, ElementGroup, Formulation};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
@@ -97,8 +97,9 @@ impl ProvedElements {
         assert_eq!(displacements.len(), 3 * self.n_nodes(), "three displacements per node");
         let mut values = vec![0.0; self.neighbours.nodes.len()];
         for part in self.members.chunks(ELEMENTS_AT_ONCE) {
-            let matrices =
-                parallel::values(part.len(), ELEMENTS_PER_TASK, |at| self.stiffness_of(&part[at], displacements));
+            let matrices = parallel::values(part.len(), ELEMENTS_PER_TASK, |at| {
+                self.stiffness_of(&part[at], displacements)
+            });
             for (member, matrix) in part.iter().zip(matrices) {
                 for (&row, of_row) in member.nodes.iter().zip(matrix.chunks(member.nodes.len())) {
                     for (&column, value) in member.nodes.iter().zip(of_row) {
@@ -115,7 +116,7 @@ impl ProvedElements {
             self.neighbours.nodes.clone(),
             values,
         );
-        SymmetricMatrix::symmetrised(matrix.expect("neighbours are ascending"))
+        SymmetricMatrix::symmetrised(matrix)
     }
 
     /// Returns the stress stiffness of an element, row by row.
@@ -145,7 +146,9 @@ impl ProvedElements {
             for (&b, &value) in columns.iter().zip(values) {
                 for k in 0..3 {
                     let (row, column) = (&self.places.of_nodes[a][k], &self.places.of_nodes[b as usize][k]);
-                    row.for_each(|i, left| column.for_each(|j, right| entries.push((i, j, left * value * right))));
+                    row.for_each(|i, left| {
+                        column.for_each(|j, right| entries.push((i, j, left * value * right)))
+                    });
                 }
             }
         }

@@ -20,6 +20,7 @@ mod recovery;
 mod settings;
 mod shapes;
 mod soft_rotations;
+mod stress_stiffness;
 
 pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
 pub use conversion::{Conversion, convert, interface_compliance, poor_fits};
@@ -31,3 +32,4 @@ pub(crate) use recovery::{BodyOfModel, Recovered};
 pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
 pub use shapes::{RecoveryShapes, ShapeColumn, UNIFORM_STRAIN, load_shapes, recovery_shapes};
+pub use stress_stiffness::StressLoads;

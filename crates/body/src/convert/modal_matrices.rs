@@ -131,6 +131,7 @@ const MAX_ENTRY: f64 = 1e290;
 /// as zero, so that K_geo of any load is equal in all axes. Components without any contribution are omitted. Kinds are
 /// in the order of the model, components in their own order.
 ///
+/// * `computed`: S' K_geo S for the modes S and then the rotations of [`unit_rotations`], of loads that are not given.
 /// * `shift`: origin of the frame relative to the point that spin and angular acceleration refer to, frame
 ///   axes; zero except for a frame on an interface. Unit: length.
 ///
@@ -139,24 +140,28 @@ const MAX_ENTRY: f64 = 1e290;
 pub fn modal_geometric_stiffness(
     model: &FeModel,
     vectors: &Mat<f64>,
+    computed: Vec<GeometricStiffness<Mat<f64>>>,
     frame: &Frame,
     shift: &Vector3<f64>,
 ) -> Result<SplitStiffness> {
-    let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
-    if model.geometric_stiffness().is_empty() {
-        return Ok((out, Vec::new()));
+    if model.geometric_stiffness().is_empty() && computed.is_empty() {
+        return Ok((Vec::new(), Vec::new()));
     }
+    let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
     let shapes = side_by_side(&[vectors.as_ref(), unit_rotations(model, frame).as_ref()]);
     for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
-        let reduced_matrix = reduced(matrix, shapes.as_ref());
-        if reduced_matrix.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
+        out.push(GeometricStiffness { load: load.clone(), matrix: reduced(matrix, shapes.as_ref()) });
+    }
+    out.extend(computed);
+    for GeometricStiffness { load, matrix } in &out {
+        if matrix.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > MAX_ENTRY)) {
             let message = format!("geometric stiffness for {load} overflows on the modes");
             return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
         }
-        out.push(GeometricStiffness { load: load.clone(), matrix: reduced_matrix });
     }
+    let kinds: Vec<LoadKind> = out.iter().map(|one| one.load.kind.clone()).collect();
+    let place = |kind: &LoadKind| kinds.iter().position(|one| one == kind);
     let mut out = stiffness_about(&along(&out, &frame.axes), shift, model.dimension());
-    let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
     out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
     Ok(split(out))
 }

@@ -3,6 +3,7 @@
 
 use super::body_modes::{self, reduced, reduced_in_twice_the_precision};
 use super::soft_rotations::effect_of_soft_rotations;
+use super::stress_stiffness::{StressedModes, stress_stiffness};
 use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::basis::{BasisChoice, ModalBasis, Task};
 use crate::flex_body::{Guarantee, Interface, RotatedStiffness, TermDecision, TermGroup, TermGroups};
@@ -80,8 +81,15 @@ impl<'m> ModalModel<'m> {
             Some(frame) => frame.origin - mass_properties.centre_of_mass,
             None => Vector3::zeros(),
         };
+        let of = StressedModes {
+            modes: &modes.vectors,
+            modal_stiffness: &modal_stiffness,
+            lowest: found.solution.eigenvalues[0],
+            frame: &frame,
+        };
+        let computed = stress_stiffness(model, settings.stress_stiffness, &of, context)?;
         let (geometric_stiffness, rotated_stiffness) =
-            modal_geometric_stiffness(model, &modes.vectors, &frame, &shift)?;
+            modal_geometric_stiffness(model, &modes.vectors, computed, &frame, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let all = model.nodes_of_body();
         let nodes = Nodes { ids: all.ids.clone(), positions: frame.to_body(&all.positions) };

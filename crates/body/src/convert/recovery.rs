@@ -252,7 +252,19 @@ impl<'m> FreeBasis<'m> {
         first: f64,
         context: &Context<'_>,
     ) -> Result<Mat<f64>> {
-        accurate_static_responses(&self.coupled, loads.forces.clone(), first, context)
+        self.responses_to(loads.forces.clone(), first, context)
+    }
+
+    /// Returns the static responses G F to nodal forces (N x m), in mean axes.
+    ///
+    /// * `first`: about the first flexible eigenvalue.
+    pub(super) fn responses_to(
+        &self,
+        forces: Mat<f64>,
+        first: f64,
+        context: &Context<'_>,
+    ) -> Result<Mat<f64>> {
+        accurate_static_responses(&self.coupled, forces, first, context)
     }
 
     /// Returns f'G f of each named load, for its `responses` G_r F in mean axes among those to all loads.
@@ -418,6 +430,11 @@ impl StaticLoads {
             motion: kinds,
             modes,
         })
+    }
+
+    /// Returns the nodal forces of some of the loads (N x columns).
+    pub(super) fn forces_of(&self, columns: &[usize]) -> Mat<f64> {
+        Mat::from_fn(self.forces.nrows(), columns.len(), |i, at| self.forces[(i, columns[at])])
     }
 
     /// Returns the names of the loads, in their order.

@@ -1,5 +1,6 @@
 //! Settings of a conversion.
 
+use super::StressLoads;
 use crate::basis::{BasisChoice, Loads, ModeSettings};
 use crate::invariants::{FrameChoice, LumpedScheme};
 use flexbody_eigen::Wanted;
@@ -54,6 +55,8 @@ pub struct ConvertSettings {
     pub lumped_modes: bool,
     /// Surface of the body.
     pub mesh: MeshChoice,
+    /// Loads whose stress stiffness is computed from the elements of the deck.
+    pub stress_stiffness: StressLoads,
 }
 
 impl Default for ConvertSettings {
@@ -67,6 +70,7 @@ impl Default for ConvertSettings {
             lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
             lumped_modes: false,
             mesh: MeshChoice::default(),
+            stress_stiffness: StressLoads::default(),
         }
     }
 }
@@ -95,6 +99,9 @@ impl ConvertSettings {
         }
         if let Some(engine) = self.basis.engine() {
             described["engine"] = serde_json::json!(engine);
+        }
+        if !self.stress_stiffness.is_empty() {
+            described["stress_stiffness"] = serde_json::json!(self.stress_stiffness.names());
         }
         // The file itself shows if there is a surface.
         if let (MeshChoice::AtMost(most), Some(_)) = (self.mesh, model.mesh()) {

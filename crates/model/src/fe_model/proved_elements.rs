@@ -64,11 +64,16 @@ fn in_words(refusal: &Refusal) -> (String, Option<usize>, &'static str) {
     match refusal {
         Refusal::NotDescribed(part) => (part.what.clone(), part.line, UNKNOWN),
         Refusal::UnknownType { kind, nodes, count } => {
-            let message = format!("{count} elements of type {kind} with {nodes} nodes have no formulation that K can prove");
+            let message = format!(
+                "{count} elements of type {kind} with {nodes} nodes have no formulation that K can prove"
+            );
             (message, None, UNKNOWN)
         }
         Refusal::Degenerate { kind, ids } => {
-            let message = format!("{} are inverted, or lie on the axis of a cylindrical orientation", elements(kind, ids));
+            let message = format!(
+                "{} are inverted, or lie on the axis of a cylindrical orientation",
+                elements(kind, ids)
+            );
             (message, None, DIFFERENT)
         }
         Refusal::WithoutRow(missing) => {
@@ -96,8 +101,7 @@ fn in_words(refusal: &Refusal) -> (String, Option<usize>, &'static str) {
             (message, None, DIFFERENT)
         }
         Refusal::Unexplained { entries, at, largest } => {
-            let [from, to] =
-                at.map(|(node, direction)| DofLabel { node, direction }.to_string());
+            let [from, to] = at.map(|(node, direction)| DofLabel { node, direction }.to_string());
             let message = format!(
                 "{entries} entries of K are not the sum of the elements around them: largest difference {} of the row sums, between {from} and {to}; an element, a spring or a constraint is missing in the deck",
                 significant(*largest, 3)
