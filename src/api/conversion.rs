@@ -4,7 +4,7 @@ use super::progress::{Listener, NO_LISTENER, heard};
 use super::{Basis, FlexBody, Model, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::convert::{self, MeshChoice};
+use flexbody_body::convert::{self, MeshChoice, StressLoads};
 use flexbody_body::invariants::FrameChoice;
 use flexbody_eigen::Accuracy;
 use flexbody_motion::scene::LoadCases;
@@ -62,6 +62,12 @@ impl ConvertOptions {
     /// Limits the surface to `most` triangles.
     pub fn mesh_triangles(mut self, most: usize) -> Self {
         self.0.mesh = MeshChoice::AtMost(most);
+        self
+    }
+
+    /// Sets the loads whose stress stiffness is computed from the elements of the deck, which K has to prove.
+    pub fn geometric_stiffness(mut self, loads: StressLoads) -> Self {
+        self.0.stress_stiffness = loads;
         self
     }
 

@@ -34,6 +34,7 @@ impl ConvertArguments {
                 (false, Some(most)) => MeshChoice::AtMost(most as usize),
                 (false, None) => MeshChoice::Whole,
             },
+            stress_stiffness: self.geometric_stiffness,
             storage: self.storage,
             stated: stated_parts(&self.stated)?,
             allow_unjudged: self.allow_unjudged,

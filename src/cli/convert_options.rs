@@ -4,6 +4,7 @@ use super::arguments::ConvertArguments;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::basis::BasisKind;
+use flexbody_body::convert::StressLoads;
 use flexbody_eigen::Accuracy;
 use serde_json::Value;
 use std::path::Path;
@@ -43,5 +44,7 @@ pub(super) fn with_settings_of(arguments: &ConvertArguments, path: &Path) -> Res
     own.residual_vectors = Some(names("residual_vectors").join(","));
     own.lumped = if lumped.is_empty() { "none".to_owned() } else { lumped };
     own.storage = body.storage();
+    let stressed = names("stress_stiffness").join(",");
+    own.geometric_stiffness = StressLoads::parse(&stressed).map_err(|name| refused(&format!("its stress stiffness `{name}` is not known")))?;
     Ok(own)
 }

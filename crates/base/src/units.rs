@@ -140,6 +140,14 @@ impl UnitSystem {
         }
     }
 
+    /// Returns the unit of stress: `MPa`, or `lb/(in s^2)` if no prefix fits.
+    pub fn stress_name(&self) -> String {
+        let named = prefix(self.in_si(-1)).map(|prefix| format!("{prefix}Pa"));
+        named.unwrap_or_else(|| {
+            format!("{}/({} {}^2)", self.mass_name(), self.length_name(), self.time_name())
+        })
+    }
+
     /// Returns mass length^power / time^2 in kg m^power / s^2.
     fn in_si(&self, power: i32) -> f64 {
         self.mass.to_si * self.length.to_si.powi(power) / self.time.to_si.powi(2)

@@ -29,4 +29,4 @@ pub use elasticity::Elasticity;
 pub use formulation::Formulation;
 pub use geometry::PointVolume;
 pub use proof::{Refusal, prove};
-pub use proved::ProvedElements;
+pub use proved::{NodalStresses, ProvedElements};

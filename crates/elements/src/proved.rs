@@ -4,13 +4,16 @@ use crate::places::Places;
 use crate::{DescribedElements, ElementGroup, Formulation};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Elements of a parallel task.
 const ELEMENTS_PER_TASK: usize = 64;
 
 /// Elements whose matrices are in memory at a time.
 const ELEMENTS_AT_ONCE: usize = 8192;
+
+/// Places with stresses of a parallel task.
+const PLACES_PER_TASK: usize = 16;
 
 /// Nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;
@@ -28,6 +31,15 @@ pub struct ProvedElements {
     members: Vec<Member>,
     /// Nodes that share an element with each node, ascending, as columns of a matrix.
     neighbours: Neighbours,
+}
+
+/// Operator of stresses at nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalStresses<'a> {
+    /// Node and material of each place, ascending. A node at which materials meet has one place for each.
+    pub places: Vec<(i64, &'a str)>,
+    /// R' by the rows of the stiffness: the columns of each place are its stresses xx, yy, zz, xy, yz, xz.
+    pub transposed: CscMatrix,
 }
 
 /// Element of a group, with its nodes in `Places`: those of the deck, then those inside.
@@ -65,6 +77,11 @@ impl ProvedElements {
     /// Returns the groups of elements with their formulations.
     pub fn groups(&self) -> impl Iterator<Item = (&ElementGroup, Formulation)> {
         self.described.groups.iter().zip(self.formulations.iter().copied())
+    }
+
+    /// Returns the nodes of elements that are in the deck, ascending.
+    pub fn deck_nodes(&self) -> &[i64] {
+        &self.places.nodes[..self.places.positions.len()]
     }
 
     /// Returns the number of nodes of elements, those inside elements included.
@@ -130,6 +147,62 @@ impl ProvedElements {
         let stresses = formulation.stresses(&positions, &moved, section);
         let matrix = stresses.and_then(|stresses| formulation.geometric_stiffness(&positions, &stresses));
         matrix.expect("elements with a stiffness have stresses")
+    }
+
+    /// Returns the operator of stresses at nodes: for each node of `nodes`, and each material around it, the mean over its
+    /// elements of this material of their stresses extrapolated to the node. Nodes of no element are left out.
+    pub fn nodal_stresses(&self, nodes: &[i64]) -> NodalStresses<'_> {
+        let mut around: BTreeMap<(i64, &str), Vec<(usize, usize)>> = BTreeMap::new();
+        let wanted: HashSet<i64> = nodes.iter().copied().collect();
+        for (at, member) in self.members.iter().enumerate() {
+            let material = self.described.groups[member.group as usize].section.material.as_str();
+            let count = self.formulations[member.group as usize].n_nodes();
+            for (corner, node) in member.nodes[..count].iter().enumerate() {
+                let node = self.places.nodes[*node as usize];
+                if wanted.contains(&node) {
+                    around.entry((node, material)).or_default().push((at, corner));
+                }
+            }
+        }
+        let places: Vec<(i64, &str)> = around.keys().copied().collect();
+        let corners: Vec<Vec<(usize, usize)>> = around.into_values().collect();
+        let blocks = parallel::values(corners.len(), PLACES_PER_TASK, |at| self.mean_stress(&corners[at]));
+        let entries = blocks.into_iter().enumerate().flat_map(|(at, block)| {
+            let of_row = move |(row, values): (u32, [f64; 6])| {
+                values.into_iter().enumerate().map(move |(k, value)| (row, (6 * at + k) as u32, value))
+            };
+            block.into_iter().flat_map(of_row)
+        });
+        let entries: Vec<(u32, u32, f64)> = entries.collect();
+        let transposed = CscMatrix::from_triplets(self.rows, 6 * places.len(), &entries);
+        NodalStresses { places, transposed }
+    }
+
+    /// Returns the mean stress of elements at their corners: six values for each row of the stiffness.
+    fn mean_stress(&self, corners: &[(usize, usize)]) -> BTreeMap<u32, [f64; 6]> {
+        let mut sums: BTreeMap<u32, [f64; 6]> = BTreeMap::new();
+        for &(at, corner) in corners {
+            let member = &self.members[at];
+            let formulation = self.formulations[member.group as usize];
+            let section = &self.described.groups[member.group as usize].section;
+            let rows = formulation.stress_rows(&self.positions_of(member), section);
+            let rows = rows.expect("elements with a stiffness have stresses");
+            let weights = &formulation.nodal_extrapolation()[corner];
+            for (column, place) in
+                member.nodes.iter().flat_map(|node| &self.places.of_nodes[*node as usize]).enumerate()
+            {
+                let stress: [f64; 6] = std::array::from_fn(|k| {
+                    let at_points =
+                        weights.iter().enumerate().map(|(p, weight)| weight * rows[6 * p + k][column]);
+                    at_points.sum::<f64>() / corners.len() as f64
+                });
+                place.for_each(|row, factor| {
+                    let sum = sums.entry(row).or_default();
+                    sum.iter_mut().zip(stress).for_each(|(sum, value)| *sum += factor * value);
+                });
+            }
+        }
+        sums
     }
 
     fn positions_of(&self, member: &Member) -> Vec<[f64; 3]> {

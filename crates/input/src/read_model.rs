@@ -134,6 +134,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         damping,
         geometric_stiffness,
         recoveries,
+        nodal_stresses: Vec::new(),
         named_loads,
         elements: None,
         sources: Sources::default(),

@@ -118,6 +118,11 @@ pub(crate) fn check_body(mut body: Assembled, mut found: Vec<Diagnostic>) -> Res
         && model.followers().is_none_or(|points| !points.are_all());
     found.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
+    let asked = model.take_nodal_stresses();
+    if let Err(error) = model.add_nodal_stresses(&asked) {
+        found.extend(error.into_diagnostics());
+        stop_on_error(&mut found)?;
+    }
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
     check_stresses(&model, density, allowed, &mut found);
     note_stress_points(&model, &mut found);

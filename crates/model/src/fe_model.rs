@@ -16,7 +16,7 @@ use crate::directors::mass_structure::MassForm;
 use crate::fe_model::assemble::Assembled;
 use crate::{
     BodyNumber, Damping, Description, DirectorMass, DofLabel, Followers, GeometricStiffness, GivenRows,
-    ModelData, ModelLoad, ModelRecovery, NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
+    ModelData, ModelLoad, ModelRecovery, NodalStress, NodeSet, Nodes, Rows, SoftRotations, SurfaceMesh,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -274,6 +274,16 @@ impl FeModel {
         let d = self.dimension();
         let squares = u[..d * self.nodes.len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());
         squares.fold(0.0, larger).sqrt()
+    }
+
+    /// Adds a recovery in the internal order of rows.
+    pub(crate) fn push_recovery(&mut self, recovery: ModelRecovery) {
+        self.data.recoveries.push(recovery);
+    }
+
+    /// Takes the requests of stresses at nodes out of the model.
+    pub(crate) fn take_nodal_stresses(&mut self) -> Vec<NodalStress> {
+        std::mem::take(&mut self.data.nodal_stresses)
     }
 
     /// Returns the named node sets.

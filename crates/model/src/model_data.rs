@@ -1,6 +1,8 @@
 //! Data of a model that its steps share.
 
-use crate::{Damping, Description, GeometricStiffness, ModelLoad, ModelRecovery, NodeSet, SurfaceMesh};
+use crate::{
+    Damping, Description, GeometricStiffness, ModelLoad, ModelRecovery, NodalStress, NodeSet, SurfaceMesh,
+};
 use flexbody_base::provenance::Sources;
 use flexbody_elements::DescribedElements;
 use std::sync::Arc;
@@ -22,6 +24,8 @@ pub struct ModelData<M> {
     /// Rows to read off the body. The operators have the rows of the files as read, and the internal rows after the
     /// checks.
     pub recoveries: Vec<ModelRecovery>,
+    /// Stresses at nodes, from elements that K proves.
+    pub nodal_stresses: Vec<NodalStress>,
     /// Nodal forces with a name, by the rows of the files as read, and by internal rows after the checks.
     pub named_loads: Vec<ModelLoad>,
     /// Elements, materials and constraints as the deck describes them, if they were asked for.
@@ -41,6 +45,7 @@ impl<M> ModelData<M> {
             damping: None,
             geometric_stiffness: Vec::new(),
             recoveries: Vec::new(),
+            nodal_stresses: Vec::new(),
             named_loads: Vec::new(),
             elements: None,
             sources: Sources::default(),

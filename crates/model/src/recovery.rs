@@ -1,5 +1,6 @@
 //! Recovery: rows that read stresses, strains, forces or displacements off the deformed body (theory section 12).
 
+pub(crate) mod nodal_stress;
 pub(crate) mod stress_labels;
 pub(crate) mod stress_points;
 

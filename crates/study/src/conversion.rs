@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, BasisKind, ImportedShapes, ModeSettings};
-use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert};
+use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, StressLoads, convert};
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::FrameChoice;
 use flexbody_body::verification::accept;
@@ -49,6 +49,8 @@ pub struct ConversionRequest {
     pub lumped_modes: bool,
     /// Surface of the body.
     pub mesh: MeshChoice,
+    /// Loads whose stress stiffness is computed from the elements of the deck.
+    pub stress_stiffness: StressLoads,
     /// Floats of shapes and of the inertia of the modes.
     pub storage: Storage,
     /// Parts of the body that are stated; `None` if a scene selects them, and for the whole body without a scene.
@@ -74,6 +76,7 @@ impl Default for ConversionRequest {
             lumped,
             lumped_modes: false,
             mesh,
+            stress_stiffness: StressLoads::default(),
             storage: Storage::default(),
             stated: None,
             allow_unjudged: false,
@@ -229,6 +232,7 @@ impl ConversionRequest {
             lumped: self.lumped.clone(),
             lumped_modes: self.lumped_modes,
             mesh: self.mesh,
+            stress_stiffness: self.stress_stiffness,
         };
         let mut made = match cases {
             Some(cases) => self

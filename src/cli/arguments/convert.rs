@@ -2,12 +2,13 @@
 
 #[cfg(feature = "cluster")]
 use super::EngineArguments;
-use super::headings::{COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT, SCENE};
+use super::headings::{COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT, SCENE, STRESS};
 #[cfg(feature = "import")]
 use super::import::ForeignArguments;
-use super::{JobArguments, Printing, StatedArguments, memory_size, names, positive};
+use super::{JobArguments, Printing, StatedArguments, memory_size, names, positive, stress_loads};
 use clap::Args;
 use flexbody_body::basis::BasisKind;
+use flexbody_body::convert::StressLoads;
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::FrameChoice;
 use flexbody_eigen::{Accuracy, FactorChoice};
@@ -116,6 +117,14 @@ pub struct ConvertArguments {
     /// Write the body for a scene even if its selection does not hold, or cannot be judged (FB557)
     #[arg(long, requires = "scene", help_heading = SCENE)]
     pub allow_unjudged: bool,
+    /// Loads whose stress stiffness is computed from the elements of the deck, which K has to prove (FB462): spin,
+    /// interfaces (unit forces and moments), loads (named ones, except preloads), comma-separated, or none [default: none]
+    #[arg(long, value_name = "LOADS", value_parser = stress_loads, default_value = "none", hide_default_value = true, help_heading = STRESS)]
+    pub geometric_stiffness: StressLoads,
+    /// Recover stresses from the elements of the deck, which K has to prove (FB462), as recovery `stress`: at all nodes
+    /// (nodes), at those on the surface (surface), or at those of a node set, by its name [repeatable]
+    #[arg(long, value_name = "NODES", help_heading = STRESS)]
+    pub stress: Vec<String>,
     /// Solver for the modes.
     #[cfg(feature = "cluster")]
     #[command(flatten)]

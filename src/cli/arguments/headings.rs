@@ -5,6 +5,7 @@ pub(super) const MODES: &str = "Modes";
 pub(super) const COST: &str = "Accuracy and cost";
 pub(super) const FRAME: &str = "Frame";
 pub(super) const COMPARISON: &str = "Comparison with lumped masses";
+pub(super) const STRESS: &str = "Stress from the deck";
 pub(super) const SCENE: &str = "Scene";
 pub(super) const FORMAT: &str = "Format";
 pub(super) const LOSSES: &str = "Losses";

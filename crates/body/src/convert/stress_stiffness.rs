@@ -33,6 +33,23 @@ impl StressLoads {
     /// Names of the kinds of loads, in the order of the documentation.
     pub const NAMES: [&'static str; 3] = ["spin", "interfaces", "loads"];
 
+    /// Returns the kinds of loads with the given names, separated by commas: `none` and an empty text are no loads.
+    ///
+    /// # Errors
+    /// The first name that is not known.
+    pub fn parse(text: &str) -> std::result::Result<Self, String> {
+        let mut wanted = Self::default();
+        for name in text.split(',').map(str::trim).filter(|name| !name.is_empty() && *name != "none") {
+            match name {
+                "spin" => wanted.spin = true,
+                "interfaces" => wanted.interfaces = true,
+                "loads" => wanted.loads = true,
+                _ => return Err(name.to_owned()),
+            }
+        }
+        Ok(wanted)
+    }
+
     /// Returns the names of the kinds of loads that are wanted.
     pub fn names(self) -> Vec<&'static str> {
         let kinds = [self.spin, self.interfaces, self.loads];

@@ -187,6 +187,7 @@ fn body_model(
         damping,
         geometric_stiffness,
         recoveries: recoveries_of_body(&all.recoveries, kept, &nodes),
+        nodal_stresses: all.nodal_stresses.clone(),
         named_loads: loads_of_body(&all.named_loads, kept),
         elements: all.elements.clone(),
         sources: all.sources.clone(),

@@ -211,6 +211,7 @@ impl InternalOrder<'_> {
             damping,
             geometric_stiffness,
             recoveries,
+            nodal_stresses: std::mem::take(&mut given.nodal_stresses),
             named_loads,
             elements: given.elements.take(),
             sources: std::mem::take(&mut given.sources),
