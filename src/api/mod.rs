@@ -39,6 +39,7 @@ pub use comparison::Comparison;
 pub use conversion::{Conversion, ConvertOptions};
 pub use export::ExportOptions;
 pub use flexbody_body::basis::BasisKind as Basis;
+pub use flexbody_body::convert::StressLoads;
 pub use flexbody_body::invariants::{BodyFrame, FrameChoice};
 pub use flexbody_eigen::Accuracy;
 pub use flexbody_input::{Recipe, Step as RecipeStep};

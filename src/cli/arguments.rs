@@ -16,6 +16,7 @@ mod response;
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand};
 use flexbody_base::numbers::parse_ratio;
+use flexbody_body::convert::StressLoads;
 use flexbody_body::flex_body::Storage;
 use flexbody_formats::FORMATS;
 use flexbody_formats::export::ExportFormat;
@@ -585,6 +586,12 @@ pub enum Deflection {
     PartOfExtent(f64),
 }
 
+fn stress_loads(text: &str) -> Result<StressLoads, String> {
+    let names = StressLoads::NAMES.join(", ");
+    StressLoads::parse(text).map_err(|name| format!("`{name}` is none of {names}, none"))
+}
+
+/// Parses a positive number.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

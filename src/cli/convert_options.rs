@@ -45,6 +45,7 @@ pub(super) fn with_settings_of(arguments: &ConvertArguments, path: &Path) -> Res
     own.lumped = if lumped.is_empty() { "none".to_owned() } else { lumped };
     own.storage = body.storage();
     let stressed = names("stress_stiffness").join(",");
-    own.geometric_stiffness = StressLoads::parse(&stressed).map_err(|name| refused(&format!("its stress stiffness `{name}` is not known")))?;
+    own.geometric_stiffness = StressLoads::parse(&stressed)
+        .map_err(|name| refused(&format!("its stress stiffness `{name}` is not known")))?;
     Ok(own)
 }

@@ -47,7 +47,8 @@ pub use matrices::operator::OperatorColumns;
 pub use matrices::{ArraySource, HEAD, MatrixRole, MatrixSource, READERS, Reader};
 pub use model_files::{
     InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, NamedLoadSource,
-    OperatorSource, RecoverySource, Region, StressStiffnessSource, TableFiles, WithStress, parse_units,
+    NodalStressSource, OperatorSource, RecoverySource, Region, StressNodesSource, StressStiffnessSource,
+    TableFiles, WithStress, parse_units,
 };
 pub use read_model::{interface_in_memory, read_matrix, read_model};
 pub use recipes::{RECIPES, Recipe, Step};

@@ -93,7 +93,7 @@ impl ManifestWalk<'_, '_> {
         let interfaces = self.interfaces(top, usize::from(dimension));
         let damping = self.damping(top);
         let geometric_stiffness = self.geometric_stiffness(top);
-        let recoveries = self.recoveries(top, usize::from(dimension));
+        let (recoveries, nodal_stresses) = self.recoveries(top, usize::from(dimension));
         let named_loads = self.named_loads(top);
         let residual_vectors = self.residual_vectors(top);
         let Some((files, span)) = self.table(top, "files") else {
@@ -118,6 +118,7 @@ impl ManifestWalk<'_, '_> {
             damping,
             geometric_stiffness,
             recoveries,
+            nodal_stresses,
             named_loads,
             residual_vectors,
             manifest: Some(self.path.to_path_buf()),

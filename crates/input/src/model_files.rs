@@ -35,6 +35,8 @@ pub struct ModelFiles {
     pub geometric_stiffness: Vec<GeometricStiffness<StressStiffnessSource>>,
     /// Rows to read off the body.
     pub recoveries: Vec<RecoverySource>,
+    /// Stresses at nodes, from the elements of the deck.
+    pub nodal_stresses: Vec<NodalStressSource>,
     /// Nodal forces with a name.
     pub named_loads: Vec<NamedLoadSource>,
     /// Loads whose static responses join the modes.
@@ -105,6 +107,37 @@ pub struct NamedLoadSource {
     pub vector: MatrixLocation,
     /// True if the load acts always with amplitude 1.
     pub preload: bool,
+}
+
+/// Stresses at nodes, from the elements of the deck, as a recovery.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalStressSource {
+    /// Name of the recovery, unique within the model.
+    pub name: String,
+    /// Nodes whose stresses are wanted.
+    pub nodes: StressNodesSource,
+}
+
+/// Nodes whose stresses are wanted, by name.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StressNodesSource {
+    /// All nodes of elements.
+    All,
+    /// Nodes on the surface.
+    Surface,
+    /// A node set of the job, by its name in any case.
+    Set(String),
+}
+
+impl StressNodesSource {
+    /// Returns the nodes that a text names: `nodes`, `surface`, or the name of a set.
+    pub fn parse(text: &str) -> Self {
+        match text {
+            "nodes" => Self::All,
+            "surface" => Self::Surface,
+            name => Self::Set(name.to_owned()),
+        }
+    }
 }
 
 /// Rows to read off the body, and the files of their operator.
@@ -374,6 +407,7 @@ impl ModelFiles {
             damping: None,
             geometric_stiffness: Vec::new(),
             recoveries: Vec::new(),
+            nodal_stresses: Vec::new(),
             named_loads: Vec::new(),
             residual_vectors: Vec::new(),
             manifest: None,

@@ -29,7 +29,7 @@ use labels_of_file::LabelsOfFile;
 use model_matrices::{JobFileRead, ModelMatrices};
 use open_files::OpenFiles;
 use parsed::{Matrices, Parsed};
-use recoveries::recoveries;
+use recoveries::{nodal_stresses, recoveries};
 use recovery_files::read_forces;
 use rows_of_model::by_rows_of_model;
 use sources::{roles, sources};
@@ -109,6 +109,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         .filter_map(|interface| take(&mut diagnostics, places.interface(interface, opened, files)))
         .collect();
     let recoveries = recoveries(&places, opened, files, &mut diagnostics);
+    let nodal_stresses = nodal_stresses(&places, opened, files, &mut diagnostics);
     let named_loads = read_loads(opened, files, &mut diagnostics);
     let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     let mesh = matrices.as_ref().map(|matrices| {
@@ -134,7 +135,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         damping,
         geometric_stiffness,
         recoveries,
-        nodal_stresses: Vec::new(),
+        nodal_stresses,
         named_loads,
         elements: None,
         sources: Sources::default(),

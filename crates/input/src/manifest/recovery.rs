@@ -2,7 +2,9 @@
 
 use super::{ManifestWalk, MatrixLocation, TomlTable};
 use crate::fe_results::files_listed_by;
-use crate::model_files::{InterfaceNodes, OperatorSource, RecoverySource};
+use crate::model_files::{
+    InterfaceNodes, NodalStressSource, OperatorSource, RecoverySource, StressNodesSource,
+};
 use flexbody_base::diagnostic::Code;
 use std::collections::HashSet;
 use std::ops::Range;
@@ -23,25 +25,56 @@ pub(super) const RECOVERY: &[&str] = &[
     "plane",
     "about",
     "deformed_inertia",
+    "stress",
 ];
 
 /// Keys of [`RECOVERY`] that define the rows.
-const SOURCES: &[&str] = &["operator", "shapes", "cut", "set", "box", "cylinder", "plane"];
+const SOURCES: &[&str] = &["operator", "shapes", "cut", "set", "box", "cylinder", "plane", "stress"];
 
 impl ManifestWalk<'_, '_> {
-    /// Reads the rows to read off the body. Entries with errors are left out; the errors are in `found`.
-    pub(super) fn recoveries(&mut self, top: &TomlTable, dimension: usize) -> Vec<RecoverySource> {
-        let (mut names, mut given) = (HashSet::new(), Vec::new());
+    /// Reads the rows to read off the body, and the stresses at nodes. Entries with errors are left out; the errors are in
+    /// `found`.
+    pub(super) fn recoveries(
+        &mut self,
+        top: &TomlTable,
+        dimension: usize,
+    ) -> (Vec<RecoverySource>, Vec<NodalStressSource>) {
+        let (mut names, mut rows, mut stresses) = (HashSet::new(), Vec::new(), Vec::new());
         for (table, span) in self.tables(top, "recovery").unwrap_or_default() {
-            if let Some(one) = self.recovery(table, span.clone(), dimension) {
-                if !names.insert(one.name.clone()) {
-                    let message = format!("recovery `{}` is given twice", one.name);
-                    self.complain(Code::ManifestSyntax, span, message);
-                }
-                given.push(one);
+            let name = if table.contains_key("stress") {
+                let read = self.nodal_stress(table, span.clone());
+                read.map(|one| {
+                    let name = one.name.clone();
+                    stresses.push(one);
+                    name
+                })
+            } else {
+                let read = self.recovery(table, span.clone(), dimension);
+                read.map(|one| {
+                    let name = one.name.clone();
+                    rows.push(one);
+                    name
+                })
+            };
+            if let Some(name) = name
+                && !names.insert(name.clone())
+            {
+                let message = format!("recovery `{name}` is given twice");
+                self.complain(Code::ManifestSyntax, span, message);
             }
         }
-        given
+        (rows, stresses)
+    }
+
+    /// Reads stresses at nodes: the key `stress` with the name of the nodes.
+    fn nodal_stress(&mut self, table: &TomlTable, span: Range<usize>) -> Option<NodalStressSource> {
+        self.known_keys(table, "[[recovery]] with `stress`", &["name", "stress"]);
+        if !table.contains_key("name") {
+            self.complain(Code::ManifestSyntax, span, "recovery has no name".into());
+        }
+        let name = self.string(table, "name")?;
+        let nodes = StressNodesSource::parse(&self.string(table, "stress")?);
+        Some(NodalStressSource { name, nodes })
     }
 
     fn recovery(

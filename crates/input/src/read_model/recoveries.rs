@@ -7,12 +7,13 @@ use super::recovery_files::{read_offset, read_operator};
 use crate::fe_results::{AnswerFiles, read_answers};
 use crate::matrices::operator::OperatorColumns;
 use crate::model_files::{
-    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, OperatorSource, RecoverySource,
+    InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, NodalStressSource, OperatorSource,
+    RecoverySource, StressNodesSource,
 };
 use crate::tables::read_recovery_rows;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_linalg::CscMatrix;
-use flexbody_model::{GivenRows, ModelRecovery, RecoveryOperator, Reference};
+use flexbody_model::{GivenRows, ModelRecovery, NodalStress, RecoveryOperator, Reference, StressNodes};
 use std::borrow::Cow;
 
 /// Returns the recoveries of the model; adds errors and warnings.
@@ -28,6 +29,35 @@ pub(super) fn recoveries(
             diagnostics.extend(found);
             read.push(recovery);
         }
+    }
+    read
+}
+
+/// Returns the stresses at nodes that are asked for, with the numbers of their nodes; adds errors.
+pub(super) fn nodal_stresses(
+    lookup: &NodeLookup<'_>,
+    opened: &OpenFiles,
+    files: &ModelFiles,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<NodalStress> {
+    let mut read = Vec::with_capacity(files.nodal_stresses.len());
+    for NodalStressSource { name, nodes } in &files.nodal_stresses {
+        let nodes = match nodes {
+            StressNodesSource::All => StressNodes::All,
+            StressNodesSource::Surface => StressNodes::Surface,
+            StressNodesSource::Set(set) => {
+                let (nodes, reference) = (InterfaceNodes::Set(set.clone()), Reference::Centre);
+                let as_set = InterfaceSource { name: name.clone(), nodes, coupling: None, reference };
+                let found = lookup.node_set(&format!("recovery `{name}`"), &as_set, opened, files);
+                let Some(found) = take(diagnostics, found) else { continue };
+                StressNodes::These(found.nodes)
+            }
+        };
+        read.push(NodalStress {
+            name: name.clone(),
+            nodes,
+            path: files.manifest.clone().unwrap_or_default(),
+        });
     }
     read
 }
