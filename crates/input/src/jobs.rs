@@ -3,11 +3,14 @@
 
 mod abaqus;
 mod calculix;
+mod couplings;
 mod deck;
 mod deck_mesh;
 mod deck_of_elements;
 mod deck_scope;
 mod deck_surfaces;
+mod described;
+mod described_file;
 mod element_kinds;
 mod expanded;
 mod job;
@@ -32,6 +35,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) use calculix::read_stiffness as read_calculix_stiffness;
 pub use deck_of_elements::ElementDeck;
+pub(super) use described_file::{describe_deck, is_described_by_deck};
 pub use job::JobFile;
 pub(super) use job::JobModel;
 pub(super) use nastran::nodes_of_bulk;
@@ -63,11 +67,11 @@ pub(super) fn family(job: &JobFile) -> Vec<PathBuf> {
     family
 }
 
-/// Reads a job.
+/// Reads a job, with the description of its elements if `describe` is true.
 ///
 /// # Errors
 /// FB102 for a compressed file, FB108 if no reader recognises the file, and the errors of [`JobReader::read`].
-pub(super) fn read_job(job: &JobFile) -> Diagnosed<JobModel> {
+pub(super) fn read_job(job: &JobFile, describe: bool) -> Diagnosed<JobModel> {
     let reader = match &job.program {
         Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
         None => {
@@ -86,7 +90,7 @@ pub(super) fn read_job(job: &JobFile) -> Diagnosed<JobModel> {
                     .with_help("leave the names of the matrices out"),
             ])
         }
-        Some(reader) => reader.read(job),
+        Some(reader) => reader.read(job, describe),
         None => Err(vec![unknown(job)]),
     }
 }

@@ -14,6 +14,7 @@ mod array;
 mod bulk_cards;
 mod classic_netcdf;
 mod digits;
+mod element_source;
 mod exodus;
 mod fe_results;
 #[cfg(feature = "hdf5")]
@@ -39,6 +40,7 @@ mod stated;
 mod tables;
 
 pub use array::Array;
+pub use element_source::ElementSource;
 pub use fe_results::{PointStresses, read_point_stresses, read_steps};
 pub use jobs::{ElementDeck, JobFile, is_job, job_programs};
 pub use manifest::read_manifest;

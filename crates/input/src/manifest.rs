@@ -1,5 +1,6 @@
 //! The manifest `model.toml`. Its machine-readable contract is `schemas/manifest.schema.json`.
 
+mod elements;
 mod interface;
 mod named_load;
 mod recovery;
@@ -18,8 +19,17 @@ use std::ops::{Deref, DerefMut, Range};
 use std::path::Path;
 use toml::de::DeValue;
 
-const TOP: &[&str] =
-    &["model", "files", "interface", "damping", "geometric_stiffness", "recovery", "named_load", "basis"];
+const TOP: &[&str] = &[
+    "model",
+    "files",
+    "elements",
+    "interface",
+    "damping",
+    "geometric_stiffness",
+    "recovery",
+    "named_load",
+    "basis",
+];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible", "keep_soft_rotations"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];
@@ -90,6 +100,7 @@ impl ManifestWalk<'_, '_> {
             Some((table, span)) => self.units(table, span)?,
             None => UnitSystem::default(),
         };
+        let elements = self.elements(top);
         let interfaces = self.interfaces(top, usize::from(dimension));
         let damping = self.damping(top);
         let geometric_stiffness = self.geometric_stiffness(top);
@@ -114,6 +125,8 @@ impl ManifestWalk<'_, '_> {
             keep_soft_rotations,
             source: source?,
             mesh,
+            describe_elements: false,
+            elements,
             interfaces: interfaces?,
             damping,
             geometric_stiffness,

@@ -1,5 +1,6 @@
 //! The files of a model.
 
+use super::element_source::ElementSource;
 use super::jobs::{JobFile, family};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -27,6 +28,10 @@ pub struct ModelFiles {
     pub source: ModelSource,
     /// File whose elements draw the part, if it is not the file of the nodes.
     pub mesh: Option<PathBuf>,
+    /// True if the elements of the deck of a job are described in the model, beside those of [`Self::elements`].
+    pub describe_elements: bool,
+    /// Files of elements, materials and constraints of which K is assembled; in place of the deck of a job.
+    pub elements: Vec<ElementSource>,
     /// Named node sets.
     pub interfaces: Vec<InterfaceSource>,
     /// Damping, if it is given.
@@ -367,6 +372,7 @@ impl ModelFiles {
             .into_iter()
             .chain(self.manifest.clone())
             .chain(self.mesh.clone())
+            .chain(self.elements.iter().map(|elements| elements.path.clone()))
             .chain(damping)
             .chain(geometric)
             .chain(interfaces)
@@ -403,6 +409,8 @@ impl ModelFiles {
             keep_soft_rotations: false,
             source,
             mesh: None,
+            describe_elements: false,
+            elements: Vec::new(),
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),

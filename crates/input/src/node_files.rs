@@ -84,7 +84,7 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Diagnosed<NodeF
 }
 
 /// Returns true when a file is a keyword deck: its first line that is no comment is a keyword.
-fn is_deck(head: &str) -> bool {
+pub(super) fn is_deck(head: &str) -> bool {
     let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
     first
         .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))

@@ -1,5 +1,6 @@
 //! Reads all files of a model and collects all their problems.
 
+mod described;
 mod diagnostics;
 mod interfaces;
 mod labels_of_file;
@@ -16,6 +17,7 @@ mod with_stress;
 
 use super::mesh::MeshReading;
 use super::model_files::{ModelFiles, ModelSource, NamedLoadSource};
+use described::{DescribedFiles, described_of_files};
 use diagnostics::{collect, take};
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
@@ -119,6 +121,10 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     });
     let mesh = mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
+    let described = matrices.as_ref().filter(|_| !files.elements.is_empty()).and_then(|matrices| {
+        let labels = matrices.plain(files.dimension).labels;
+        take(&mut diagnostics, described_of_files(&files.elements, opened, &labels))
+    });
     // Errors end here, with all diagnostics that were found.
     let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
@@ -128,6 +134,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     diagnostics.extend(difference_note(&differences));
     let (mesh, partly) = mesh.unwrap_or_default();
     diagnostics.extend(partly);
+    let DescribedFiles { elements, files: more_files } = described.unwrap_or_default();
     let data = ModelData {
         description: files.description.clone(),
         interfaces,
@@ -153,9 +160,10 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         followers: matrices.followers,
         allow_implausible: files.allow_implausible,
         keep_soft_rotations: files.keep_soft_rotations,
+        described_elements: elements.or(matrices.described),
         diagnostics,
     };
-    Ok((model, matrices.files))
+    Ok((model, matrices.files.into_iter().chain(more_files).collect()))
 }
 
 /// Returns the geometric stiffness of every load that could be read; adds errors. Also returns the number of digits that

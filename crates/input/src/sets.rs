@@ -65,10 +65,16 @@ impl NodeSets {
         Self { scopes: SetScopes { top, instances: Vec::new() }, ..Self::default() }
     }
 
-    /// Returns the sets of an assembly and of its instances.
-    pub(crate) fn of_instances(mut top: SetScope, mut instances: Vec<SetInstance>) -> Self {
+    /// Returns the sets of an assembly and of its instances. Element sets of instances are resolved if `keep_elements` is
+    /// true.
+    pub(crate) fn of_instances(
+        mut top: SetScope,
+        mut instances: Vec<SetInstance>,
+        keep_elements: bool,
+    ) -> Self {
         let name_elements = |scope: &SetScope| scope.nodes.name_elements();
-        let are_used = name_elements(&top) || instances.iter().any(|one| name_elements(&one.scope));
+        let are_used =
+            keep_elements || name_elements(&top) || instances.iter().any(|one| name_elements(&one.scope));
         if !are_used && !top.elements.has_ranges() {
             top.element_nodes.clear();
             instances.iter_mut().for_each(|one| one.scope.element_nodes.clear());
@@ -120,6 +126,12 @@ impl NodeSets {
     pub(crate) fn elements(&self, name: &str) -> Option<Vec<i64>> {
         let set = self.scopes.top.elements.so_far(name)?;
         Some(Walk::new(&self.scopes).elements(None, set))
+    }
+
+    /// Returns the members of an element set of an instance, or of the assembly, in the numbering of its part.
+    pub(crate) fn elements_of(&self, instance: Option<usize>, name: &str) -> Option<Vec<i64>> {
+        let set = self.scopes.of(instance).elements.so_far(name)?;
+        Some(Walk::new(&self.scopes).elements(instance, set))
     }
 
     /// Returns the index of an instance.

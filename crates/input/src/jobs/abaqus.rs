@@ -4,6 +4,7 @@
 
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
+use super::described::{DescribedRows, Program, Requested, described};
 use super::element_kinds::{family, has_internal_nodes};
 use super::job::{FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
@@ -17,7 +18,7 @@ use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::scanner::{Line, Lines, excerpt, integer, real};
 use flexbody_linalg::parallel;
 use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Reader of Abaqus jobs.
@@ -39,17 +40,25 @@ impl JobReader for Abaqus {
         is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
     }
 
-    fn read(&self, job: &JobFile) -> Diagnosed<JobModel> {
+    fn read(&self, job: &JobFile, describe: bool) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let matrices = Matrices::beside(path);
         let deck = Deck::read(path)?;
-        let mesh = DeckMesh::of(&deck)?;
+        let mesh = DeckMesh::read(&deck, describe)?;
         let (rows, note) = match (matrices, file_of(&deck, path)) {
             (Ok(matrices), _) => (Rows::of_model(&matrices, &mesh, path)?, matrices.note),
             (Err(_), Some((file, note))) => (Rows::of_substructure(&file, &deck, &mesh)?, note),
             (Err(missing), None) => return Err(missing),
         };
         let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
+        let described = match describe {
+            true => {
+                let no_rotations = HashMap::new();
+                let labels = DescribedRows::new(Program::Abaqus, &rows.labels, &no_rotations);
+                Some(described(&deck, &mesh, &labels, &Requested::default())?)
+            }
+            false => None,
+        };
         let deck_files = deck.seen()?.into_iter();
         Ok(JobModel {
             stiffness: rows.stiffness,
@@ -63,6 +72,7 @@ impl JobReader for Abaqus {
             files: deck_files.chain(rows.files).collect(),
             diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
             followers: None,
+            described,
         })
     }
 }

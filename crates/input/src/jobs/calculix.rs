@@ -1,9 +1,11 @@
 //! Jobs of CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes `job.sti`, `job.mas` (upper triangles, 14 digits) and
 //! `job.dof` (a line `node.direction` for every row) into the folder of the deck `job.inp`.
 
+use super::couplings::Coupling;
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
+use super::described::{DescribedRows, Program, Requested, described, expanded};
 use super::expanded::{Once, copies_in_sets, label_once};
 use super::job::{JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
@@ -37,7 +39,7 @@ impl JobReader for Calculix {
         is_deck(path) && ["sti", "mas", "dof"].iter().any(|extension| path.with_extension(extension).exists())
     }
 
-    fn read(&self, job: &JobFile) -> Diagnosed<JobModel> {
+    fn read(&self, job: &JobFile, describe: bool) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| path.with_extension(extension));
         let absent =
@@ -48,7 +50,7 @@ impl JobReader for Calculix {
             return Err(absent);
         }
         let deck = Deck::read(path)?;
-        let mesh = DeckMesh::of(&deck)?;
+        let mesh = DeckMesh::read(&deck, describe)?;
         let (labels, dofs_file) = read_labels(&dof)?;
         let rotations = rotation_nodes(&deck, &mesh, &labels)?;
         let means = reference_places(&deck, &mesh)?;
@@ -65,6 +67,7 @@ impl JobReader for Calculix {
         };
         let labels = knots.labels(labels);
         let Once { labels, places, copies } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
+        let has_copies = !copies.is_empty();
         let label = |label: &DofLabel| match rotations.get(&label.node) {
             Some(reference) => DofLabel { node: *reference, direction: label.direction + 3 },
             None => *label,
@@ -75,6 +78,14 @@ impl JobReader for Calculix {
         let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
+        let described = match (describe, knots.are_absent() && !has_copies) {
+            (false, _) => None,
+            (true, false) => Some(expanded(&deck)),
+            (true, true) => {
+                let rows = DescribedRows::new(Program::Calculix, &dofs, &rotations);
+                Some(described(&deck, &mesh, &rows, &Requested::default())?)
+            }
+        };
         let elements = mesh.drawn_by_corners();
         let sets = mesh.sets.with_copies(copies_in_sets(copies, &nodes, &dofs));
         let (ids, positions) = nodes.into_iter().unzip();
@@ -93,6 +104,7 @@ impl JobReader for Calculix {
             files,
             diagnostics,
             followers: None,
+            described,
         })
     }
 }
@@ -204,65 +216,6 @@ fn named_rotation_nodes(deck: &Deck) -> Diagnosed<Vec<Rotation<'_>>> {
         return Err(vec![diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B")]);
     }
     Ok(rotations)
-}
-
-/// A *COUPLING with *KINEMATIC.
-struct Coupling<'d> {
-    card: &'d Card,
-    /// Number of lines of directions below *KINEMATIC.
-    n_lines: usize,
-}
-
-impl Coupling<'_> {
-    /// Returns the kinematic couplings of a deck in their order. *DISTRIBUTING only distributes loads over a surface:
-    /// it creates no nodes, and its reference node has no rows.
-    fn all(deck: &Deck) -> Vec<Coupling<'_>> {
-        let cards = deck.cards();
-        let mut couplings = Vec::new();
-        for (k, card) in cards.iter().enumerate().filter(|(_, card)| card.keyword == "COUPLING") {
-            let below = cards[k + 1..].iter().take_while(|card| card.keyword == "KINEMATIC");
-            let counts: Vec<usize> = below.map(|card| deck.data(card).count()).collect();
-            if !counts.is_empty() {
-                couplings.push(Coupling { card, n_lines: counts.iter().sum() });
-            }
-        }
-        couplings
-    }
-
-    /// Returns the number of node numbers that the coupling takes besides that of its rotation node. Each line of
-    /// directions creates one node for each node of the surface. With ORIENTATION every node of the surface creates a
-    /// copy of itself and one node for the equations of the copy, and the lines create none. Returns `None` if the
-    /// nodes of the surface are unknown.
-    fn n_numbers(&self, surfaces: &mut Surfaces<'_>) -> Option<i64> {
-        let nodes = surfaces.count(&self.card.name("SURFACE")?)?;
-        let for_each = if self.card.parameter("ORIENTATION").is_some() { 2 } else { self.n_lines };
-        i64::try_from(nodes.checked_mul(for_each)?).ok()
-    }
-
-    /// Returns the reference node, given by its number or by a set of one node.
-    ///
-    /// # Errors
-    /// FB111 if REF NODE is neither.
-    fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Diagnosed<i64> {
-        let text = self.card.parameter("REFNODE").unwrap_or_default();
-        let set = || match mesh.set(text)?.as_slice() {
-            [node] => Some(*node),
-            _ => None,
-        };
-        integer(text.as_bytes()).or_else(set).ok_or_else(|| {
-            let message = format!("REF NODE `{text}` of *COUPLING is neither a node nor a set of one node");
-            let diagnostic = deck.about(self.card, Code::DeckUnsupported, message);
-            vec![diagnostic.with_help("write the number of the reference node, as in REF NODE=17")]
-        })
-    }
-
-    /// Returns FB111: the rows of the rotations of the reference node cannot be identified.
-    fn refuse<T>(&self, deck: &Deck, reference: i64, why: &str, help: &str) -> Diagnosed<T> {
-        let message = format!(
-            "*COUPLING, *KINEMATIC: the rows of the rotations of REF NODE {reference} cannot be identified: {why}"
-        );
-        Err(vec![deck.about(self.card, Code::DeckUnsupported, message).with_help(help)])
-    }
 }
 
 /// Kinematic coupling with its reference node, and the number of its rotation node by the deck.

@@ -2,8 +2,12 @@
 
 use crate::sets::comparable;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
+use flexbody_base::memory::{left, refuse_beyond};
+use flexbody_base::text::Compression;
+use flexbody_base::text::compression::broken;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, line_end};
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -13,10 +17,52 @@ const MAX_INCLUDE_DEPTH: usize = 20;
 /// Largest number of included files, each counted as often as it is included.
 const MAX_FILES: usize = 1000;
 
+/// Number of bytes of a compressed deck that are unpacked at a time.
+const PIECE_BYTES: usize = 1 << 26;
+
 /// Deck with all files that it includes.
 pub(super) struct Deck {
-    files: Vec<InputFile>,
+    files: Vec<DeckFile>,
     cards: Vec<Card>,
+}
+
+/// File of a deck.
+struct DeckFile {
+    file: InputFile,
+    /// Text of a compressed file.
+    unpacked: Option<Vec<u8>>,
+}
+
+impl DeckFile {
+    fn open(path: &Path) -> Result<Self, Diagnostic> {
+        let file = InputFile::open(path)?;
+        let compression = Compression::of(file.bytes());
+        if compression == Compression::None {
+            return Ok(Self { file, unpacked: None });
+        }
+        let mut text = Vec::new();
+        let mut stream = compression.stream_of(&file);
+        loop {
+            // A small file may hold a large text, which grows piece by piece within the memory.
+            let needed = (text.len() + PIECE_BYTES) as f64;
+            let fits = refuse_beyond(left(), needed, "unpacking the deck", "use a larger machine");
+            fits.map_err(|refused| refused.first_error().clone().in_file(path))?;
+            let read = (&mut stream).take(PIECE_BYTES as u64).read_to_end(&mut text);
+            if read.map_err(|error| broken(path, &error))? == 0 {
+                break;
+            }
+        }
+        drop(stream);
+        Ok(Self { file, unpacked: Some(text) })
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.unpacked.as_deref().unwrap_or_else(|| self.file.bytes())
+    }
+
+    fn path(&self) -> &Path {
+        self.file.path()
+    }
 }
 
 /// Keyword line and the lines of data below it.
@@ -58,7 +104,7 @@ impl Card {
 }
 
 impl Deck {
-    /// Reads a deck and the files that it includes.
+    /// Reads a deck and the files that it includes, compressed or not.
     ///
     /// # Errors
     /// FB101, FB106 for files that cannot be read; FB110 for lines of data before the first keyword, and for files that
@@ -80,7 +126,7 @@ impl Deck {
     /// # Errors
     /// FB132 for files that changed while they were read.
     pub(super) fn seen(&self) -> Diagnosed<Vec<(&'static str, SeenFile)>> {
-        let seen = |file: &InputFile| Ok(("deck", file.seen()?));
+        let seen = |file: &DeckFile| Ok(("deck", file.file.seen()?));
         self.files.iter().map(seen).collect::<Result<_, Diagnostic>>().map_err(|diagnostic| vec![diagnostic])
     }
 
@@ -102,13 +148,23 @@ impl Deck {
         Diagnostic::new(code, message).in_file(self.files[card.file].path()).at_line(line)
     }
 
+    /// Returns the line of a card in the main file; `None` in an included file.
+    pub(super) fn line(&self, card: &Card) -> Option<usize> {
+        (card.file == 0).then_some(card.line)
+    }
+
+    /// Returns the path of the main file.
+    pub(super) fn path(&self) -> &Path {
+        self.files.first().map_or(Path::new(""), DeckFile::path)
+    }
+
     /// Returns a diagnostic about a card.
     pub(super) fn about(&self, card: &Card, code: Code, message: impl Into<String>) -> Diagnostic {
         self.at(card, card.line, code, message)
     }
 
     fn include(&mut self, path: &Path, depth: usize) -> Result<(), Diagnostic> {
-        let file = InputFile::open(path)?;
+        let file = DeckFile::open(path)?;
         if depth > MAX_INCLUDE_DEPTH || self.files.len() >= MAX_FILES {
             let message = format!(
                 "included files are nested more than {MAX_INCLUDE_DEPTH} levels deep, or are more than {MAX_FILES}"

@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::scanner::{self, BadLines, excerpt, integer};
 use nalgebra::{Rotation3, Unit, Vector3};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
 /// Largest number of values of a line of a generated set. More of them are a mistake: no model has so many nodes.
@@ -16,6 +16,9 @@ const MAX_GENERATED: i64 = 100_000_000;
 
 /// Bytes of memory of a node or an element of an instance, at least.
 const BYTES_PER_NODE: f64 = 64.0;
+
+/// Keywords of cards that describe elements by sets and axes of the scope that they are in.
+const SCOPED: &[&str] = &["SOLIDSECTION", "SPRING", "ORIENTATION"];
 
 /// Upper limit of the numbers of renumbered nodes.
 const MAX_NODE_NUMBER: i64 = 1_000_000_000_000;
@@ -30,6 +33,19 @@ pub(super) struct DeckMesh {
     pub sets: NodeSets,
     /// Notes about the numbering.
     pub notes: Vec<Diagnostic>,
+    /// Content of the instances and of the assembly, for the description of elements; empty if it was not requested.
+    pub scopes: Vec<PlacedScope>,
+}
+
+/// Content of an instance, or of the assembly or a deck without parts.
+#[derive(Debug)]
+pub(super) struct PlacedScope {
+    /// Index of the instance; `None` for the assembly.
+    pub instance: Option<usize>,
+    pub scope: Scope,
+    /// Difference of the node numbers of the model from those of the scope.
+    pub shift: i64,
+    pub moved: Placement,
 }
 
 impl DeckMesh {
@@ -38,13 +54,24 @@ impl DeckMesh {
     /// # Errors
     /// FB110 for lines that cannot be read, FB111 for cards that define nodes in a way that is not supported.
     pub(super) fn of(deck: &Deck) -> Diagnosed<Self> {
+        Self::read(deck, false)
+    }
+
+    /// Reads nodes, elements and node sets of `deck`, and keeps its scopes if `keep_scopes` is true.
+    ///
+    /// # Errors
+    /// FB110 for lines that cannot be read, FB111 for cards that define nodes in a way that is not supported.
+    pub(super) fn read(deck: &Deck, keep_scopes: bool) -> Diagnosed<Self> {
         let mut reading = DeckMeshReader { deck, bad: BadLines::default(), placed: 0 };
         let mut scopes = Scopes::default();
-        for card in deck.cards() {
+        for (at, card) in deck.cards().iter().enumerate() {
             reading.card(card, &mut scopes);
+            if keep_scopes && SCOPED.contains(&card.keyword.as_str()) {
+                Arc::make_mut(&mut scopes.current().cards).push(at);
+            }
         }
         reading.bad.finish(Code::DeckSyntax, "line")?;
-        scopes.assembled()
+        scopes.assembled(keep_scopes)
     }
 
     /// Returns the elements for drawing.
@@ -86,21 +113,29 @@ struct Instance {
 
 /// Displacement, then a rotation about an axis.
 #[derive(Debug, Clone, Default)]
-struct Placement {
+pub(super) struct Placement {
     displacement: [f64; 3],
     /// Two points of the axis, and the angle in degrees.
     turn: Option<[f64; 7]>,
 }
 
 impl Placement {
-    fn of(&self, x: [f64; 3]) -> [f64; 3] {
+    /// Returns the position of a point of the part.
+    pub(super) fn of(&self, x: [f64; 3]) -> [f64; 3] {
         let mut x = Vector3::from(x) + Vector3::from(self.displacement);
-        if let Some([a, b, c, d, e, f, degrees]) = self.turn {
-            let (from, to) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
-            let turn = Rotation3::from_axis_angle(&Unit::new_normalize(to - from), degrees.to_radians());
-            x = from + turn * (x - from);
+        if let Some([a, b, c, ..]) = self.turn {
+            let from = Vector3::new(a, b, c);
+            x = from + self.rotation() * (x - from);
         }
         x.into()
+    }
+
+    /// Returns the rotation of the part.
+    pub(super) fn rotation(&self) -> Rotation3<f64> {
+        self.turn.map_or(Rotation3::identity(), |[a, b, c, d, e, f, degrees]| {
+            let axis = Vector3::new(d - a, e - b, f - c);
+            Rotation3::from_axis_angle(&Unit::new_normalize(axis), degrees.to_radians())
+        })
     }
 }
 
@@ -153,9 +188,9 @@ impl Scopes {
 
     /// Returns the model of all instances. Node numbers are kept if no two instances share one; else every instance
     /// gets a separate range of numbers.
-    fn assembled(self) -> Diagnosed<DeckMesh> {
+    fn assembled(self, keep_scopes: bool) -> Diagnosed<DeckMesh> {
         let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.scope)).collect();
-        let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
+        let mut taken: HashSet<i64> = self.top.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
         let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);
         let highest = keys.filter_map(|nodes| nodes.keys().next_back().copied()).max().unwrap_or(0);
@@ -186,9 +221,17 @@ impl Scopes {
                 mesh.notes.push(Diagnostic::new(Code::DeckRenumbered, message));
             }
             mesh.add(scope, shift, instance);
+            if keep_scopes {
+                let (scope, moved) = ((*scope).clone(), instance.moved.clone());
+                mesh.scopes.push(PlacedScope { instance: Some(k), scope, shift, moved });
+            }
             instances.push(SetInstance { name: instance.name.clone(), scope: numbers.scope(scope, shift) });
         }
-        mesh.sets = NodeSets::of_instances(numbers.scope(&self.top, 0), instances);
+        mesh.sets = NodeSets::of_instances(numbers.scope(&self.top, 0), instances, keep_scopes);
+        if keep_scopes {
+            let moved = Placement::default();
+            mesh.scopes.push(PlacedScope { instance: None, scope: self.top, shift: 0, moved });
+        }
         Ok(mesh)
     }
 }
@@ -224,6 +267,15 @@ impl DeckMesh {
             };
             self.elements.push(Elements { kind: elements.kind.clone(), members });
         }
+    }
+
+    /// Returns the nodes of the elements of an element set outside of parts and instances.
+    pub(super) fn nodes_of_elements(&self, set: &str) -> Option<Vec<i64>> {
+        let members: HashSet<i64> = self.sets.elements(set)?.into_iter().collect();
+        let elements = self.elements.iter().flat_map(|elements| elements.members.iter());
+        let nodes =
+            elements.filter(|(id, _)| members.contains(id)).flat_map(|(_, nodes)| nodes.iter().copied());
+        Some(nodes.collect::<BTreeSet<i64>>().into_iter().collect())
     }
 
     /// Returns the nodes of a set.

@@ -20,4 +20,6 @@ pub(super) struct Scope {
     pub elements: Arc<Vec<Elements>>,
     pub sets: Arc<SetList>,
     pub element_sets: Arc<SetList>,
+    /// Indices in the deck of the cards of sections, springs, axes and constraints.
+    pub cards: Arc<Vec<usize>>,
 }

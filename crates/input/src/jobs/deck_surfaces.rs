@@ -61,7 +61,7 @@ impl<'d> Surfaces<'d> {
     /// Returns the nodes of the surface `name` (in upper case), given by nodes or by faces of solid elements. A surface of
     /// nodes takes precedence over one of faces with the same name. Returns `None` if there is no such surface, or if it
     /// has sets that the deck does not define or faces of other elements.
-    fn nodes(&self, name: &str) -> Option<BTreeSet<i64>> {
+    pub(super) fn nodes(&self, name: &str) -> Option<BTreeSet<i64>> {
         let is_of_nodes = |card: &Card| card.name("TYPE").as_deref() == Some("NODE");
         let cards = self.cards.get(name)?;
         let by_nodes = cards.iter().any(|card| is_of_nodes(card));

@@ -84,6 +84,48 @@ pub(super) fn has_internal_nodes(kind: &str) -> bool {
     kind.starts_with("B33") || kind.starts_with("B23") || kind.starts_with('B') && kind.ends_with('H')
 }
 
+/// Contribution of an element type to the stiffness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Solid with a material.
+    Solid,
+    /// Spring.
+    Spring,
+    /// Type without stiffness.
+    WithoutStiffness,
+    /// Type that is not described, with the reason.
+    Other(&'static str),
+}
+
+/// Returns the contribution of an element type to the stiffness.
+pub(super) fn role(kind: &str) -> Role {
+    let begins = |heads: &[&str]| heads.iter().any(|head| kind.starts_with(head));
+    if begins(&["C3D"]) {
+        return Role::Solid;
+    }
+    if matches!(kind, "SPRINGA" | "SPRING1" | "SPRING2") {
+        return Role::Spring;
+    }
+    // The element of a distributing coupling only names its reference node.
+    if begins(&["DASHPOT", "HEATCAP"]) || kind == "DCOUP3D" {
+        return Role::WithoutStiffness;
+    }
+    match family(kind) {
+        Some(Family::Mass | Family::Turner) => Role::WithoutStiffness,
+        Some(Family::Solid) => Role::Other("continuum shells are not described"),
+        Some(Family::Plane) if kind.starts_with('T') => Role::Other("trusses are not described"),
+        Some(Family::Plane) => Role::Other("elements of plane models are not described"),
+        Some(Family::Turning) if kind.starts_with('B') => Role::Other("beams are not described"),
+        Some(Family::Turning) => Role::Other("shells are not described"),
+        Some(Family::PlaneTurning) => Role::Other("beams are not described"),
+        Some(Family::Pulling) if kind.starts_with('T') => Role::Other("trusses are not described"),
+        Some(Family::Pulling) => Role::Other("membranes are not described"),
+        None if kind.starts_with('U') => Role::Other("user elements are not described"),
+        None if kind.starts_with("GAP") => Role::Other("gaps are not described"),
+        None => Role::Other("the type is unknown"),
+    }
+}
+
 /// Drawing of an element.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Drawing {

@@ -3,6 +3,7 @@
 use crate::sets::NodeSets;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
+use flexbody_elements::DescribedElements;
 use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawFollowers, RawMatrix};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,8 @@ pub(crate) struct JobModel {
     pub sets: NodeSets,
     /// Elements by which the part is drawn.
     pub elements: Elements,
+    /// Elements, materials and constraints of the deck, if they were requested.
+    pub described: Option<DescribedElements>,
     /// Every file that was read, with its role.
     pub files: Vec<(&'static str, SeenFile)>,
     /// Warnings and notes.
@@ -52,11 +55,11 @@ pub(super) trait JobReader: Sync {
     /// Returns true when the file at `path` is the main file of such a job.
     fn recognises(&self, path: &Path) -> bool;
 
-    /// Reads matrices, nodes, labels and sets.
+    /// Reads matrices, nodes, labels and sets, and the description of the elements if `describe` is true.
     ///
     /// # Errors
     /// FB101 to FB112 for files and decks, FB2xx for tables and nodes, FB3xx for matrices, all that are found.
-    fn read(&self, job: &JobFile) -> Diagnosed<JobModel>;
+    fn read(&self, job: &JobFile, describe: bool) -> Diagnosed<JobModel>;
 
     /// Returns true when the matrices of a job have names by which a user may choose.
     fn names_matrices(&self) -> bool {

@@ -46,7 +46,7 @@ impl JobReader for Nastran {
         true
     }
 
-    fn read(&self, job: &JobFile) -> Diagnosed<JobModel> {
+    fn read(&self, job: &JobFile, _describe: bool) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let mut bulk = Bulk::read(path)?;
         if bulk.grids.is_empty() {
@@ -84,6 +84,7 @@ impl JobReader for Nastran {
             elements,
             files,
             diagnostics,
+            described: None,
         })
     }
 }

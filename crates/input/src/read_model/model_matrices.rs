@@ -6,6 +6,7 @@ use crate::jobs::JobModel;
 use crate::sets::NodeSets;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::text::input_file::SeenFile;
+use flexbody_elements::DescribedElements;
 use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawFollowers, RawMatrix, filled_rows};
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -28,6 +29,8 @@ pub(super) struct ModelMatrices {
     pub sets: NodeSets,
     /// Elements by which the part is drawn.
     pub elements: Elements,
+    /// Elements, materials and constraints of the deck of a job, if they were requested.
+    pub described: Option<DescribedElements>,
     /// Files of a job.
     pub files: Vec<JobFileRead>,
     pub diagnostics: Vec<Diagnostic>,
@@ -64,6 +67,7 @@ impl From<JobModel> for ModelMatrices {
             followers: job.followers,
             sets: job.sets,
             elements: job.elements,
+            described: job.described,
             files: job.files,
             diagnostics: job.diagnostics,
         }

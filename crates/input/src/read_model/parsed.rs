@@ -86,6 +86,7 @@ impl ParsedTables {
             followers: None,
             sets,
             elements,
+            described: None,
             files: Vec::new(),
             diagnostics: Vec::new(),
         })
@@ -101,7 +102,11 @@ impl Parsed {
                 .map_err(Error::into_diagnostics)
         };
         let matrices = match &files.source {
-            ModelSource::Job(job) => Matrices::Job(Box::new(read_job(job).map(ModelMatrices::from))),
+            ModelSource::Job(job) => {
+                // Files of elements stand in place of the deck.
+                let describe = files.describe_elements && files.elements.is_empty();
+                Matrices::Job(Box::new(read_job(job, describe).map(ModelMatrices::from)))
+            }
             ModelSource::Tables(tables) => {
                 let ((stiffness, mass), (nodes, dofs)) = parallel::join(
                     || {

@@ -20,6 +20,7 @@ pub(super) fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
         roles.extend(tables.dofs.as_deref().map(|path| ("dofs", path)));
     }
     roles.extend(files.mesh.as_deref().map(|path| ("mesh", path)));
+    roles.extend(files.elements.iter().map(|elements| ("elements", elements.path.as_path())));
     let damping = files.damping.as_ref().and_then(Damping::matrix);
     roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
     let geometric = files.geometric_stiffness.iter().flat_map(|one| one.matrix.files());

@@ -1,0 +1,54 @@
+//! Elements of a deck that the manifest names: the matrices of its model have other files.
+
+use super::deck::Deck;
+use super::deck_mesh::DeckMesh;
+use super::described::{DescribedRows, Program, Requested, described};
+use crate::element_source::ElementSource;
+use crate::node_files::is_deck;
+use flexbody_base::diagnostic::Diagnosed;
+use flexbody_base::text::input_file::SeenFile;
+use flexbody_base::text::scanner::integer;
+use flexbody_base::text::{Compression, InputFile};
+use flexbody_elements::DescribedElements;
+use flexbody_model::DofLabel;
+use std::collections::{HashMap, HashSet};
+
+/// Number of bytes by which a deck is recognised.
+const HEAD: usize = 4096;
+
+/// Returns true if a file, compressed or not, is a keyword deck.
+pub(in super::super) fn is_described_by_deck(file: &InputFile) -> bool {
+    let head = Compression::of(file.bytes()).head(file, HEAD);
+    is_deck(&String::from_utf8_lossy(&head))
+}
+
+/// Describes the elements of a deck by the rows of the matrices. Returns also the files that the deck includes.
+///
+/// # Errors
+/// FB101 to FB106 for files that cannot be read, FB110 and FB111 for decks that cannot be read.
+pub(in super::super) fn describe_deck(
+    source: &ElementSource,
+    labels: &[DofLabel],
+) -> Diagnosed<(DescribedElements, Vec<SeenFile>)> {
+    let deck = Deck::read(&source.path)?;
+    let mesh = DeckMesh::read(&deck, true)?;
+    let ElementSource { set, kind, elasticity, .. } = source.clone();
+    let program = if mesh.scopes.len() > 1 { Program::Abaqus } else { Program::Calculix };
+    let rotations = rotations(&deck, labels);
+    let rows = DescribedRows::new(program, labels, &rotations);
+    let described = described(&deck, &mesh, &rows, &Requested { set, kind, elasticity })?;
+    let included = deck.seen()?.into_iter().skip(1).map(|(_, file)| file).collect();
+    Ok((described, included))
+}
+
+/// Returns the reference nodes of the rotation nodes that *RIGID BODY names, if the labels have their rotations.
+fn rotations(deck: &Deck, labels: &[DofLabel]) -> HashMap<i64, i64> {
+    let turning: HashSet<i64> =
+        labels.iter().filter(|label| label.direction > 3).map(|label| label.node).collect();
+    let cards = deck.cards().iter().filter(|card| card.keyword == "RIGIDBODY");
+    let nodes = cards.filter_map(|card| {
+        let node = |name: &str| card.parameter(name).and_then(|text| integer(text.as_bytes()));
+        Some((node("ROTNODE")?, node("REFNODE")?))
+    });
+    nodes.filter(|(_, reference)| turning.contains(reference)).collect()
+}
