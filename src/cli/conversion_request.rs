@@ -7,7 +7,9 @@ use flexbody_base::error::Result;
 use flexbody_body::convert::{Lumping, MeshChoice};
 use flexbody_body::flex_body::Subset;
 use flexbody_body::invariants::LumpedScheme;
-use flexbody_input::{LoadSource, MatrixLocation, ModelFiles, read_nodal_masses};
+use flexbody_input::{
+    LoadSource, MatrixLocation, ModelFiles, NodalStressSource, StressNodesSource, read_nodal_masses,
+};
 use flexbody_study::conversion::ConversionRequest;
 use flexbody_study::tailoring::StatedParts;
 use std::path::PathBuf;
@@ -60,8 +62,17 @@ impl ConvertArguments {
         };
         files.allow_implausible |= self.allow_implausible;
         files.keep_soft_rotations |= self.keep_soft_rotations;
+        files.describe_elements |= !self.geometric_stiffness.is_empty();
+        files.nodal_stresses.extend(self.stress.iter().map(|nodes| stress_at(nodes, self.stress.len())));
         Ok(files)
     }
+}
+
+/// Returns the stresses at the nodes that the command line names, as recovery `stress`, or under the name of the nodes if there
+/// are several.
+fn stress_at(nodes: &str, count: usize) -> NodalStressSource {
+    let name = if count == 1 { "stress" } else { nodes };
+    NodalStressSource { name: name.to_owned(), nodes: StressNodesSource::parse(nodes) }
 }
 
 /// Returns the parts of the body that the command line states; `None` if it states none, so that a scene selects them.

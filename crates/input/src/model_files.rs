@@ -28,7 +28,7 @@ pub struct ModelFiles {
     pub source: ModelSource,
     /// File whose elements draw the part, if it is not the file of the nodes.
     pub mesh: Option<PathBuf>,
-    /// True if the elements of the deck of a job are described in the model, beside those of [`Self::elements`].
+    /// True if the elements of the deck of a job are described in the model, also without stresses at nodes.
     pub describe_elements: bool,
     /// Files of elements, materials and constraints of which K is assembled; in place of the deck of a job.
     pub elements: Vec<ElementSource>,
@@ -344,6 +344,11 @@ impl std::fmt::Display for MatrixLocation {
 }
 
 impl ModelFiles {
+    /// Returns true if the elements of the deck are needed: for stresses at nodes, or as requested.
+    pub(crate) fn describes_elements(&self) -> bool {
+        self.describe_elements || !self.nodal_stresses.is_empty()
+    }
+
     /// Returns the files of the matrices and tables; `None` for a job.
     pub fn tables(&self) -> Option<&TableFiles> {
         match &self.source {

@@ -35,6 +35,7 @@ use recoveries::{nodal_stresses, recoveries};
 use recovery_files::read_forces;
 use rows_of_model::by_rows_of_model;
 use sources::{roles, sources};
+use std::sync::Arc;
 use with_stress::{StressMatrix, difference_note};
 
 pub use interfaces::interface_in_memory;
@@ -144,7 +145,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         recoveries,
         nodal_stresses,
         named_loads,
-        elements: None,
+        elements: elements.or(matrices.described).map(Arc::new),
         sources: Sources::default(),
     };
     let model = RawModel {
@@ -160,7 +161,6 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         followers: matrices.followers,
         allow_implausible: files.allow_implausible,
         keep_soft_rotations: files.keep_soft_rotations,
-        described_elements: elements.or(matrices.described),
         diagnostics,
     };
     Ok((model, matrices.files.into_iter().chain(more_files).collect()))

@@ -104,7 +104,7 @@ impl Parsed {
         let matrices = match &files.source {
             ModelSource::Job(job) => {
                 // Files of elements stand in place of the deck.
-                let describe = files.describe_elements && files.elements.is_empty();
+                let describe = files.describes_elements() && files.elements.is_empty();
                 Matrices::Job(Box::new(read_job(job, describe).map(ModelMatrices::from)))
             }
             ModelSource::Tables(tables) => {

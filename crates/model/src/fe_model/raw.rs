@@ -6,7 +6,6 @@ use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
-use flexbody_elements::DescribedElements;
 use flexbody_linalg::CscMatrix;
 use std::path::PathBuf;
 
@@ -73,8 +72,6 @@ pub struct RawModel {
     /// True if soft rotations, to which only elements that are not quite coplanar give a stiffness, stay as K
     /// has them instead of following their elements.
     pub keep_soft_rotations: bool,
-    /// Elements, materials and constraints of which a deck assembles K; `None` if they were not requested.
-    pub described_elements: Option<DescribedElements>,
     /// Warnings and notes of the readers; no errors.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -98,7 +95,6 @@ impl RawModel {
             followers: None,
             allow_implausible: false,
             keep_soft_rotations: false,
-            described_elements: None,
             diagnostics: Vec::new(),
         }
     }
