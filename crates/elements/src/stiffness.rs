@@ -6,7 +6,7 @@ use crate::shape::{HEX_CORNERS, MAX_NODES};
 use crate::{Axes, Section};
 use nalgebra::{Matrix6, Vector3};
 
-/// Factor of the hourglass stiffness in CalculiX. It is proportional to the stiffness of the hourglass modes.
+/// Factor of the hourglass stiffness in CalculiX 2.20, to which the stiffness of the hourglass modes is proportional.
 const HOURGLASS_FACTOR: f64 = 0.0005;
 
 /// Positions of the components of a stress tensor in its vector xx, yy, zz, xy, yz, xz.
@@ -101,26 +101,20 @@ fn unit_stress(point: &Point, elasticity: &Matrix6<f64>, node: usize, direction:
     })
 }
 
-/// Adds the hourglass stiffness of Flanagan and Belytschko (1981): the four hourglass modes, orthogonal to all linear
-/// displacements, with a stiffness that follows from the mean gradients.
+/// Adds the hourglass stiffness of Flanagan and Belytschko (1981) as CalculiX 2.20 has it. The hourglass modes should be
+/// orthogonal to all linear displacements; CalculiX makes them orthogonal only to those that grow along z, so that in skewed
+/// elements rigid rotations have small forces.
 fn add_hourglass(blocks: &mut Blocks, x: &[[f64; 3]], point: &Point, modulus: f64) {
-    let products = |[a, b, c]: [f64; 3]| [b * c, a * c, a * b, a * b * c];
-    let base = HEX_CORNERS.map(products);
-    let mut square = 0.0;
-    for row in &point.gradients {
-        square += row.iter().map(|value| value * value).sum::<f64>();
-    }
+    let modes = HEX_CORNERS.map(|[a, b, c]| [b * c, a * c, a * b, a * b * c]);
+    let square: f64 = point.gradients.iter().flatten().map(|value| value * value).sum();
     let stiffness = HOURGLASS_FACTOR * modulus * square * point.volume;
     for mode in 0..4 {
-        // The part of the mode that is a linear displacement is removed.
-        let slope: [f64; 3] = std::array::from_fn(|d| (0..8).map(|n| x[n][d] * base[n][mode]).sum());
-        let shape: [f64; 8] = std::array::from_fn(|n| {
-            base[n][mode] - (0..3).map(|d| point.gradients[d][n] * slope[d]).sum::<f64>()
-        });
+        let slope: f64 = (0..8).map(|n| x[n][2] * modes[n][mode]).sum();
+        let shape: [f64; 8] = std::array::from_fn(|n| modes[n][mode] - point.gradients[2][n] * slope);
         for b in 0..8 {
             for a in 0..=b {
-                for d in [0, 4, 8] {
-                    blocks[b][d][a] += stiffness * shape[a] * shape[b];
+                for diagonal in [0, 4, 8] {
+                    blocks[b][diagonal][a] += stiffness * shape[a] * shape[b];
                 }
             }
         }

@@ -151,8 +151,8 @@ fn stresses_at_points_and_nodes_are_those_of_calculix() {
         let nodes = stress_error(&nodal, &case.sections["nodal_stresses"]);
         println!("{:16} points {points:.1e} nodes {nodes:.1e}", case.name);
         assert!(points < 1e-6, "{}: {points:e}", case.name);
-        // CalculiX has factors of three to five digits.
-        assert!(nodes < 3e-4, "{}: {nodes:e}", case.name);
+        // CalculiX has factors of three to six digits, and mixes up the nodes of C3D6.
+        assert!(nodes < 3e-5 || case.kind == "C3D6", "{}: {nodes:e}", case.name);
     }
 }
 
