@@ -143,11 +143,7 @@ fn a_linear_displacement_has_a_constant_stress() {
         let found = formulation.stresses(&x, &u, &section).expect("an element");
         for (at, stress) in strains.iter().zip(&found) {
             assert!((DVector::from_column_slice(at) - &strain).amax() < 1e-14, "{}", formulation.name());
-            assert!(
-                (DVector::from_column_slice(stress) - &expected).amax() < 1e-14,
-                "{}",
-                formulation.name()
-            );
+            assert!((DVector::from_column_slice(stress) - expected).amax() < 1e-14, "{}", formulation.name());
         }
         let forces = formulation.forces(&x, &found).expect("an element");
         let total: Vector3<f64> = forces[..x.len()].iter().map(|&force| Vector3::from(force)).sum();
@@ -193,6 +189,33 @@ fn the_forces_of_displacements_are_those_of_their_stresses() {
         for (row, stress) in rows.iter().zip(found.iter().flatten()) {
             let product: f64 = row.iter().zip(u.iter().flatten()).map(|(a, b)| a * b).sum();
             assert!((product - stress).abs() < 1e-13, "{}", formulation.name());
+        }
+        let nodal = formulation.nodal_stress_rows(&x, &section).expect("an element");
+        assert_eq!(nodal.len(), 6 * formulation.n_nodes());
+        for (at, row) in nodal.iter().enumerate() {
+            let product: f64 = row.iter().zip(u.iter().flatten()).map(|(a, b)| a * b).sum();
+            let weights = &formulation.nodal_extrapolation()[at / 6];
+            let stress: f64 = weights.iter().zip(&found).map(|(w, stress)| w * stress[at % 6]).sum();
+            assert!((product - stress).abs() < 1e-12, "{}", formulation.name());
+        }
+    }
+}
+
+#[test]
+fn the_mean_dilatation_replaces_that_of_all_points() {
+    let x = element(Formulation::Hex8);
+    let mut state = 5;
+    let u: Vec<[f64; 3]> = (0..8).map(|_| random(&mut state).into()).collect();
+    let strains = |formulation: Formulation| formulation.strains(&x, &u).expect("an element");
+    let (full, mean) = (strains(Formulation::Hex8), strains(Formulation::Hex8MeanDilatation));
+    let uniform = strains(Formulation::Hex8UniformStrain)[0];
+    let dilatation = |strain: &[f64; 6]| strain[..3].iter().sum::<f64>();
+    for (full, mean) in full.iter().zip(&mean) {
+        assert!((dilatation(mean) - dilatation(&uniform)).abs() < 1e-14);
+        for k in 0..6 {
+            let part =
+                |strain: &[f64; 6]| if k < 3 { strain[k] - dilatation(strain) / 3.0 } else { strain[k] };
+            assert!((part(full) - part(mean)).abs() < 1e-14);
         }
     }
 }
@@ -339,10 +362,10 @@ fn a_linear_field_is_extrapolated_to_itself() {
         for (node, weights) in x.iter().zip(&weights) {
             assert_eq!(weights.len(), formulation.n_points());
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-13);
-            for d in 0..3 {
+            for (d, place) in node.iter().enumerate() {
                 let found: f64 = weights.iter().zip(&points).map(|(w, point)| w * point.position[d]).sum();
                 let constant = formulation.n_points() == 1 || (formulation.n_points() == 2 && d < 2);
-                let expected = if constant { points[0].position[d] } else { node[d] };
+                let expected = if constant { points[0].position[d] } else { *place };
                 assert!((found - expected).abs() < 1e-13, "{} {found} {expected}", formulation.name());
             }
         }
