@@ -57,6 +57,9 @@ impl Elasticity {
 /// Components of a symmetric tensor, in the order of its vector.
 pub(crate) const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
+/// Places of the components of a symmetric tensor in its vector, the reverse of [`COMPONENTS`].
+pub(crate) const PLACES: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+
 /// Returns the matrix that turns a vector of stresses along `axes` (columns) into one along the common axes:
 /// s_ij = sum_kl a_ik a_jl s_kl. Its transpose turns engineering strains the other way.
 pub(crate) fn stresses_along(axes: &Matrix3<f64>) -> SMatrix<f64, 6, 6> {

@@ -8,7 +8,9 @@ impl Formulation {
     /// Returns weights that make values at the nodes of values at the points: one row for each node, one column for each
     /// point. Values at the nodes are those of functions that fit the values at the points with the least squares:
     /// trilinear with 2 x 2 x 2 points, the shape functions with 3 x 3 x 3, linear or those of the wedge with 6 nodes in
-    /// tetrahedra and wedges, constant with one point. CalculiX does so with factors of four or five digits.
+    /// tetrahedra and wedges, constant with one point. CalculiX does so with factors of three to six digits. An exception
+    /// is C3D6, for which CalculiX 2.20 writes the stresses of the lower triangle at nodes 1, 3 and 5 and of the upper one at
+    /// 2, 4 and 6; here both have theirs.
     pub fn nodal_extrapolation(self) -> Vec<Vec<f64>> {
         let nodes = self.shape().nodes();
         let Some(fit) = self.fit() else {
@@ -38,12 +40,11 @@ impl Formulation {
         }
     }
 
-    /// Returns the weights of one point, or of two points of a wedge. CalculiX extrapolates from the latter with the
-    /// positions of three Gauss points, so that a linear field keeps 0.75 of its slope.
+    /// Returns the weights of one point, or of two points of a wedge.
     fn extrapolation_along_the_axis(self, nodes: &[[f64; 3]]) -> Vec<Vec<f64>> {
         let weights = |node: &[f64; 3]| match self {
             Self::Wedge6 => {
-                let share = 0.5 * node[2] / 0.6_f64.sqrt();
+                let share = 0.5 * node[2] * 3.0_f64.sqrt();
                 vec![0.5 - share, 0.5 + share]
             }
             _ => vec![1.0],

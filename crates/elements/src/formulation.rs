@@ -77,7 +77,7 @@ impl Formulation {
             ("C3D8R", 8) => &[Self::Hex8UniformStrain],
             ("CHEXA", 8) => &[Self::Hex8MeanDilatation, Self::Hex8],
             ("C3D20", 20) => &[Self::Hex20],
-            ("C3D20R" | "C3D20RI", 20) => &[Self::Hex20Reduced],
+            ("C3D20R", 20) => &[Self::Hex20Reduced],
             ("CHEXA", 20) => &[Self::Hex20Reduced, Self::Hex20],
             _ => &[],
         };

@@ -33,7 +33,7 @@ pub(crate) struct Point {
     pub(crate) dilation: Option<[PerFunction; 3]>,
 }
 
-/// Positions of the points and their volumes, the sum of which is the volume of the element.
+/// Position and volume of an integration point. The volumes of all points add up to the volume of the element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointVolume {
     /// Position.
@@ -83,20 +83,17 @@ impl Formulation {
 
     /// Returns the point whose gradients are the means over the volume. Only the volume must be positive, as in CalculiX.
     fn mean_point(self, x: &[[f64; 3]]) -> Option<Point> {
-        // The derivative of the volume for the position of a node is the integral of the gradient of its function.
+        // The integrals of the gradients are polynomials, for which the rule is exact.
         let mut integrals = [[0.0; MAX_NODES]; 3];
         let mut volume = 0.0;
         for entry in self.table() {
-            let cofactors = cofactors(&jacobian(x, &entry.slopes));
+            let jacobian = jacobian(x, &entry.slopes);
+            let cofactors = cofactors(&jacobian);
+            volume += entry.weight * determinant(&jacobian, &cofactors);
             let scaled = gradients(&cofactors, &entry.slopes);
-            for d in 0..3 {
-                for n in 0..x.len() {
-                    integrals[d][n] += entry.weight * scaled[d][n];
-                }
+            for (sum, row) in integrals.iter_mut().flatten().zip(scaled.iter().flatten()) {
+                *sum += entry.weight * row;
             }
-        }
-        for (n, position) in x.iter().enumerate() {
-            volume += position[0] * integrals[0][n];
         }
         let gradients = integrals.map(|row| row.map(|value| value / volume));
         let share = 1.0 / x.len() as f64;
@@ -110,9 +107,9 @@ impl Formulation {
         let (inverse, _) = inverse(&jacobian(x, &centre))?;
         let nodes = self.n_nodes();
         for (point, entry) in points.iter_mut().zip(self.table()) {
-            for along in 0..3 {
-                for d in 0..3 {
-                    point.gradients[d][nodes + along] = -2.0 * entry.at[along] * inverse[along][d];
+            for (along, row) in inverse.iter().enumerate() {
+                for (gradient, slope) in point.gradients.iter_mut().zip(row) {
+                    gradient[nodes + along] = -2.0 * entry.at[along] * slope;
                 }
             }
         }
@@ -155,8 +152,8 @@ fn split(functions: &[Function]) -> (PerFunction, [PerFunction; 3]) {
     let mut slopes = [[0.0; MAX_NODES]; 3];
     for (n, function) in functions.iter().enumerate() {
         values[n] = function.value;
-        for d in 0..3 {
-            slopes[d][n] = function.slope[d];
+        for (row, slope) in slopes.iter_mut().zip(function.slope) {
+            row[n] = slope;
         }
     }
     (values, slopes)
@@ -184,10 +181,15 @@ fn cofactors(matrix: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|row| std::array::from_fn(|column| minor(column, row)))
 }
 
+/// Returns the determinant of a matrix with its cofactors.
+fn determinant(matrix: &[[f64; 3]; 3], cofactors: &[[f64; 3]; 3]) -> f64 {
+    (0..3).map(|k| matrix[0][k] * cofactors[k][0]).sum()
+}
+
 /// Returns inverse and determinant of a matrix; `None` if it is singular.
 fn inverse(matrix: &[[f64; 3]; 3]) -> Option<([[f64; 3]; 3], f64)> {
     let cofactors = cofactors(matrix);
-    let determinant: f64 = (0..3).map(|k| matrix[0][k] * cofactors[k][0]).sum();
+    let determinant = determinant(matrix, &cofactors);
     let inverse = cofactors.map(|row| row.map(|value| value / determinant));
     (determinant != 0.0 && determinant.is_finite()).then_some((inverse, determinant))
 }

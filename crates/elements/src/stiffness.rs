@@ -1,19 +1,21 @@
 //! Stiffness matrices.
 
+use crate::elasticity::PLACES;
 use crate::formulation::{Formulation, Strain};
 use crate::geometry::{PerFunction, Point};
 use crate::shape::{HEX_CORNERS, MAX_NODES};
 use crate::{Axes, Section};
 use nalgebra::{Matrix6, Vector3};
 
-/// Factor of the hourglass stiffness in CalculiX. It is proportional to the stiffness of the hourglass modes.
+/// Factor of the hourglass stiffness in CalculiX 2.20, to which the stiffness of the hourglass modes is proportional.
 const HOURGLASS_FACTOR: f64 = 0.0005;
 
-/// Positions of the components of a stress tensor in its vector xx, yy, zz, xy, yz, xz.
-const PLACES: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+/// Nodes whose rows are computed at once, in vector instructions.
+const LANES: usize = 4;
 
-/// Sums of the entries of a matrix by column node, pair of directions and row node.
-type Blocks = [[PerFunction; 9]; MAX_NODES];
+/// Sums of the entries of a matrix: by column node, group of row nodes, pair of directions, row node in its group. Only
+/// groups up to that of the column node are used.
+type Blocks = [[[[f64; LANES]; 9]; MAX_NODES / LANES]; MAX_NODES];
 
 /// Elasticity of a section at the points of an element.
 pub(crate) struct Material<'a> {
@@ -51,7 +53,7 @@ impl Formulation {
     pub fn stiffness(self, x: &[[f64; 3]], section: &Section) -> Option<Vec<f64>> {
         let material = Material::new(section)?;
         let functions = self.n_functions();
-        let mut blocks = [[[0.0; MAX_NODES]; 9]; MAX_NODES];
+        let mut blocks = [[[[0.0; LANES]; 9]; MAX_NODES / LANES]; MAX_NODES];
         for point in self.geometry(x)? {
             let elasticity = material.at(point.position)?;
             add_point(&mut blocks, &point, &elasticity, functions);
@@ -65,62 +67,83 @@ impl Formulation {
 
 /// Adds volume times B' D B of a point, for row nodes up to the column node.
 fn add_point(blocks: &mut Blocks, point: &Point, elasticity: &Matrix6<f64>, functions: usize) {
-    let [gx, gy, gz] = &point.gradients;
+    let elasticity: &[[f64; 6]; 6] = elasticity.as_ref();
     for (b, column) in blocks.iter_mut().enumerate().take(functions) {
-        for j in 0..3 {
-            let stress = unit_stress(point, elasticity, b, j);
-            for i in 0..3 {
-                let [tx, ty, tz] = PLACES[i].map(|place| stress[place]);
-                let rows = column[3 * i + j][..=b].iter_mut();
-                for (((entry, x), y), z) in rows.zip(gx).zip(gy).zip(gz) {
-                    *entry += x * tx + y * ty + z * tz;
-                }
-                if let Some(dilation) = &point.dilation {
-                    let trace = stress[0] + stress[1] + stress[2];
-                    for (entry, share) in column[3 * i + j][..=b].iter_mut().zip(&dilation[i]) {
-                        *entry += share * trace;
-                    }
-                }
+        let stresses = std::array::from_fn(|direction| unit_stress(point, elasticity, b, direction));
+        for (group, entries) in column.iter_mut().enumerate().take(b / LANES + 1) {
+            add_gradients(entries, &group_of(&point.gradients, group), &stresses);
+            if let Some(dilation) = &point.dilation {
+                add_dilation(entries, &group_of(dilation, group), &stresses);
+            }
+        }
+    }
+}
+
+/// Returns the values of the row nodes of a group, along x, y and z.
+fn group_of(rows: &[PerFunction; 3], group: usize) -> [[f64; LANES]; 3] {
+    let part = |row: &PerFunction| row.as_chunks::<LANES>().0[group];
+    [part(&rows[0]), part(&rows[1]), part(&rows[2])]
+}
+
+/// Adds the work of stresses, one for each direction of the column node, on the gradients of the row nodes.
+fn add_gradients(entries: &mut [[f64; LANES]; 9], rows: &[[f64; LANES]; 3], stresses: &[[f64; 6]; 3]) {
+    for i in 0..3 {
+        for (j, stress) in stresses.iter().enumerate() {
+            let [x, y, z] = PLACES[i].map(|place| stress[place]);
+            let entry = &mut entries[3 * i + j];
+            for lane in 0..LANES {
+                entry[lane] += rows[0][lane] * x + rows[1][lane] * y + rows[2][lane] * z;
+            }
+        }
+    }
+}
+
+/// Adds the work of the traces of stresses on the dilation of the row nodes.
+fn add_dilation(entries: &mut [[f64; LANES]; 9], rows: &[[f64; LANES]; 3], stresses: &[[f64; 6]; 3]) {
+    for (i, row) in rows.iter().enumerate() {
+        for (j, stress) in stresses.iter().enumerate() {
+            let trace = stress[0] + stress[1] + stress[2];
+            for (entry, share) in entries[3 * i + j].iter_mut().zip(row) {
+                *entry += share * trace;
             }
         }
     }
 }
 
 /// Returns volume times stress for a unit displacement of a node in a direction.
-fn unit_stress(point: &Point, elasticity: &Matrix6<f64>, node: usize, direction: usize) -> [f64; 6] {
-    let columns = PLACES[direction];
-    let gradient = point.gradients.map(|row| point.volume * row[node]);
-    let share = point.dilation.map(|rows| point.volume * rows[direction][node]);
-    std::array::from_fn(|row| {
-        let entry = |column: usize| elasticity[(row, column)];
-        let mut sum = 0.0;
-        for (place, slope) in columns.into_iter().zip(gradient) {
-            sum += entry(place) * slope;
+fn unit_stress(point: &Point, elasticity: &[[f64; 6]; 6], node: usize, direction: usize) -> [f64; 6] {
+    let mut stress = [0.0; 6];
+    let mut add = |component: usize, size: f64| {
+        // The matrix is symmetric: its rows are its columns.
+        for (sum, entry) in stress.iter_mut().zip(&elasticity[component]) {
+            *sum += point.volume * size * entry;
         }
-        share.map_or(sum, |share| sum + (entry(0) + entry(1) + entry(2)) * share)
-    })
+    };
+    for (component, row) in PLACES[direction].into_iter().zip(&point.gradients) {
+        add(component, row[node]);
+    }
+    if let Some(dilation) = &point.dilation {
+        (0..3).for_each(|component| add(component, dilation[direction][node]));
+    }
+    stress
 }
 
-/// Adds the hourglass stiffness of Flanagan and Belytschko (1981): the four hourglass modes, orthogonal to all linear
-/// displacements, with a stiffness that follows from the mean gradients.
+/// Adds the hourglass stiffness of Flanagan and Belytschko (1981) as CalculiX 2.20 has it. The hourglass modes should be
+/// orthogonal to all linear displacements; CalculiX makes them orthogonal only to those that grow along z, so that in skewed
+/// elements rigid rotations have small forces.
 fn add_hourglass(blocks: &mut Blocks, x: &[[f64; 3]], point: &Point, modulus: f64) {
-    let products = |[a, b, c]: [f64; 3]| [b * c, a * c, a * b, a * b * c];
-    let base = HEX_CORNERS.map(products);
-    let mut square = 0.0;
-    for row in &point.gradients {
-        square += row.iter().map(|value| value * value).sum::<f64>();
-    }
+    let products: [fn([f64; 3]) -> f64; 4] =
+        [|[_, y, z]| y * z, |[x, _, z]| x * z, |[x, y, _]| x * y, |[x, y, z]| x * y * z];
+    let square: f64 = point.gradients.iter().flatten().map(|value| value * value).sum();
     let stiffness = HOURGLASS_FACTOR * modulus * square * point.volume;
-    for mode in 0..4 {
-        // The part of the mode that is a linear displacement is removed.
-        let slope: [f64; 3] = std::array::from_fn(|d| (0..8).map(|n| x[n][d] * base[n][mode]).sum());
-        let shape: [f64; 8] = std::array::from_fn(|n| {
-            base[n][mode] - (0..3).map(|d| point.gradients[d][n] * slope[d]).sum::<f64>()
-        });
+    for product in products {
+        let mode = HEX_CORNERS.map(product);
+        let slope: f64 = x.iter().zip(mode).map(|(position, value)| position[2] * value).sum();
+        let shape: [f64; 8] = std::array::from_fn(|n| mode[n] - point.gradients[2][n] * slope);
         for b in 0..8 {
             for a in 0..=b {
-                for d in [0, 4, 8] {
-                    blocks[b][d][a] += stiffness * shape[a] * shape[b];
+                for diagonal in [0, 4, 8] {
+                    blocks[b][a / LANES][diagonal][a % LANES] += stiffness * shape[a] * shape[b];
                 }
             }
         }
@@ -128,7 +151,7 @@ fn add_hourglass(blocks: &mut Blocks, x: &[[f64; 3]], point: &Point, modulus: f6
 }
 
 /// Returns the modulus of the hourglass stiffness as CalculiX has it: Young's modulus of an isotropic material, otherwise
-/// the stress xx for a unit strain xx.
+/// the stress xx for a unit strain xx along the axes of the model.
 fn hourglass_modulus(elasticity: &Matrix6<f64>) -> f64 {
     let (lambda, shear) = (elasticity[(0, 1)], elasticity[(3, 3)]);
     let isotropic = Matrix6::from_fn(|i, j| match (i < 3 && j < 3, i == j) {
@@ -149,16 +172,14 @@ fn hourglass_modulus(elasticity: &Matrix6<f64>) -> f64 {
 fn assemble(blocks: &Blocks, functions: usize) -> Vec<f64> {
     let size = 3 * functions;
     let mut matrix = vec![0.0; size * size];
-    for b in 0..functions {
+    for (b, groups) in blocks.iter().enumerate().take(functions) {
         for a in 0..=b {
-            for i in 0..3 {
-                for j in 0..3 {
-                    let (row, column) = (3 * a + i, 3 * b + j);
-                    if row <= column {
-                        let value = blocks[b][3 * i + j][a];
-                        matrix[row * size + column] = value;
-                        matrix[column * size + row] = value;
-                    }
+            for (pair, lanes) in groups[a / LANES].iter().enumerate() {
+                let (row, column) = (3 * a + pair / 3, 3 * b + pair % 3);
+                // Of the two triangles of a diagonal block the upper one counts, so that the matrix is symmetric exactly.
+                if row <= column {
+                    matrix[row * size + column] = lanes[a % LANES];
+                    matrix[column * size + row] = lanes[a % LANES];
                 }
             }
         }

@@ -1,13 +1,11 @@
 //! Strains and stresses at the points of an element and at its nodes, and the forces of stresses.
 
 use crate::Section;
+use crate::elasticity::PLACES;
 use crate::formulation::Formulation;
 use crate::geometry::Point;
 use crate::stiffness::Material;
 use nalgebra::Vector6;
-
-/// Positions of the components of a tensor in its vector xx, yy, zz, xy, yz, xz.
-const PLACES: [[usize; 3]; 3] = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
 
 impl Formulation {
     /// Returns the strains xx, yy, zz, xy, yz, xz (engineering shear) at each point for displacements of nodes and internal
