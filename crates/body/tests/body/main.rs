@@ -41,5 +41,6 @@ mod soft_rotations;
 mod spinning_shaft;
 mod stated_ratios;
 mod store_body;
+mod stress_stiffness;
 mod symmetry;
 mod work_counters;
