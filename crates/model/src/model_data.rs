@@ -23,7 +23,7 @@ pub struct ModelData<M> {
     /// Nodal forces with a name, by the rows of the files as read, and by internal rows after the checks.
     pub named_loads: Vec<ModelLoad>,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`,
-    /// `manifest`), file name and SHA-256 (hex) of every file read.
+    /// `elements`, `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Sources,
 }
 
