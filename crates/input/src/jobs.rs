@@ -38,7 +38,7 @@ pub use deck_of_elements::ElementDeck;
 pub(super) use described_file::{describe_deck, is_described_by_deck};
 pub use job::JobFile;
 pub(super) use job::JobModel;
-pub(super) use nastran::nodes_of_bulk;
+pub(super) use nastran::{elements_of_bulk, nodes_of_bulk};
 
 /// Every FE program whose jobs are read. The first that recognises a file reads it.
 const JOBS: &[&dyn JobReader] = &[&Calculix, &Abaqus, &Nastran];

@@ -461,6 +461,7 @@ impl ManifestWalk<'_, '_> {
 
 #[cfg(test)]
 mod tests {
+    use super::elements::ELEMENTS;
     use super::interface::{BOX, CYLINDER, INTERFACE, NEAREST, PLANE};
     use super::named_load::NAMED_LOAD;
     use super::recovery::RECOVERY;
@@ -481,6 +482,7 @@ mod tests {
             ("/properties/model/properties", MODEL),
             ("/properties/model/properties/units/properties", UNITS),
             ("/properties/files/properties", FILES),
+            ("/properties/elements/items/properties", ELEMENTS),
             ("/properties/interface/items/properties", INTERFACE),
             ("/$defs/box/properties", BOX),
             ("/$defs/cylinder/properties", CYLINDER),

@@ -31,7 +31,7 @@ pub struct ModelData<M> {
     /// Elements, materials and constraints as the deck describes them, if they were asked for.
     pub elements: Option<Arc<DescribedElements>>,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `recovery`, `named_load`, `mesh`,
-    /// `manifest`), file name and SHA-256 (hex) of every file read.
+    /// `elements`, `manifest`), file name and SHA-256 (hex) of every file read.
     pub sources: Sources,
 }
 

@@ -51,13 +51,12 @@ impl JobReader for Abaqus {
             (Err(missing), None) => return Err(missing),
         };
         let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
-        let described = match describe {
-            true => {
-                let no_rotations = HashMap::new();
-                let labels = DescribedRows::new(Program::Abaqus, &rows.labels, &no_rotations);
-                Some(described(&deck, &mesh, &labels, &Requested::default())?)
-            }
-            false => None,
+        let described = if describe {
+            let no_rotations = HashMap::new();
+            let labels = DescribedRows::new(Program::Abaqus, &rows.labels, &no_rotations);
+            Some(described(&deck, &mesh, &labels, &Requested::default())?)
+        } else {
+            None
         };
         let deck_files = deck.seen()?.into_iter();
         Ok(JobModel {

@@ -15,6 +15,7 @@ use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, expected, integer, real};
+use flexbody_elements::DescribedElements;
 use flexbody_model::{DofLabel, GivenRows, Nodes, RawMatrix};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -78,14 +79,9 @@ impl JobReader for Calculix {
         let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
-        let described = match (describe, knots.are_absent() && !has_copies) {
-            (false, _) => None,
-            (true, false) => Some(expanded(&deck)),
-            (true, true) => {
-                let rows = DescribedRows::new(Program::Calculix, &dofs, &rotations);
-                Some(described(&deck, &mesh, &rows, &Requested::default())?)
-            }
-        };
+        let is_expanded = has_copies || !knots.are_absent();
+        let described =
+            if describe { Some(described_job(&deck, &mesh, &dofs, &rotations, is_expanded)?) } else { None };
         let elements = mesh.drawn_by_corners();
         let sets = mesh.sets.with_copies(copies_in_sets(copies, &nodes, &dofs));
         let (ids, positions) = nodes.into_iter().unzip();
@@ -107,6 +103,21 @@ impl JobReader for Calculix {
             described,
         })
     }
+}
+
+/// Describes the elements of a job, nothing if its matrices have rows of solids into which shells were expanded.
+fn described_job(
+    deck: &Deck,
+    mesh: &DeckMesh,
+    labels: &[DofLabel],
+    rotations: &HashMap<i64, i64>,
+    is_expanded: bool,
+) -> Diagnosed<DescribedElements> {
+    if is_expanded {
+        return Ok(expanded(deck));
+    }
+    let rows = DescribedRows::new(Program::Calculix, labels, rotations);
+    described(deck, mesh, &rows, &Requested::default())
 }
 
 /// Reads a stiffness matrix (`.sti`) and the labels of its rows (`.dof`).

@@ -20,6 +20,10 @@ const MAX_FILES: usize = 1000;
 /// Number of bytes of a compressed deck that are unpacked at a time.
 const PIECE_BYTES: usize = 1 << 26;
 
+/// Largest length of the text of a compressed deck, in lengths of the file. Decks with a mesh have 3 to 10; a larger value
+/// lets a damaged or malicious file take more memory.
+const LARGEST_RATIO: u64 = 200;
+
 /// Deck with all files that it includes.
 pub(super) struct Deck {
     files: Vec<DeckFile>,
@@ -40,6 +44,7 @@ impl DeckFile {
         if compression == Compression::None {
             return Ok(Self { file, unpacked: None });
         }
+        let longest = LARGEST_RATIO.saturating_mul(file.length()).max(PIECE_BYTES as u64);
         let mut text = Vec::new();
         let mut stream = compression.stream_of(&file);
         loop {
@@ -50,6 +55,11 @@ impl DeckFile {
             let read = (&mut stream).take(PIECE_BYTES as u64).read_to_end(&mut text);
             if read.map_err(|error| broken(path, &error))? == 0 {
                 break;
+            }
+            if text.len() as u64 > longest {
+                let message = format!("the deck unpacks to more than {LARGEST_RATIO} times its size");
+                let diagnostic = Diagnostic::new(Code::DeckSyntax, message).in_file(path);
+                return Err(diagnostic.with_help("unpack it, and check its content"));
             }
         }
         drop(stream);

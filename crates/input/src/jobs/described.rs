@@ -13,12 +13,13 @@ use super::deck::{Card, Deck};
 use super::deck_mesh::{DeckMesh, PlacedScope};
 use super::deck_scope::Elements;
 use super::element_kinds::{Role, role};
+use crate::element_source::is_isotropic;
 use crate::sets::{comparable, dotted};
 use constraints::constraints;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_elements::{Axes, DescribedElements, Elasticity, ElementGroup, NotDescribed, Section};
 use internal::with_internal_nodes;
-use materials::{Material, is_isotropic, materials};
+use materials::{Material, materials};
 use orientations::orientation;
 use rows::Rows;
 use springs::{ReadSprings, Springs};
@@ -130,8 +131,8 @@ impl<'d> Describing<'d> {
 
     fn scope(&mut self, scope: &PlacedScope, meant: Option<&HashSet<i64>>) -> Diagnosed<()> {
         let sections = self.sections(scope)?;
-        let cards = self.last_cards(scope, "SPRING")?;
-        let springs = Springs { deck: self.deck, mesh: self.mesh, cards, rows: self.rows };
+        let (cards, of_elements) = self.cards(scope, "SPRING")?;
+        let springs = Springs { deck: self.deck, mesh: self.mesh, rows: self.rows, cards, of_elements };
         for Elements { kind, members } in scope.scope.elements.iter() {
             let chosen: Vec<(i64, Vec<i64>)>;
             let members = match meant {
@@ -166,24 +167,24 @@ impl<'d> Describing<'d> {
         others.nodes.extend(nodes);
     }
 
-    /// Returns the last card of a keyword for each element of a scope, by the numbers of the scope.
+    /// Returns the cards of a keyword in a scope, and the place of the last one that names each element.
     ///
     /// # Errors
     /// FB110 for a card whose element set is unknown.
-    fn last_cards(&self, scope: &PlacedScope, keyword: &str) -> Diagnosed<HashMap<i64, &'d Card>> {
-        let mut cards = HashMap::new();
-        for card in scope.scope.cards.iter().map(|at| &self.deck.cards()[*at]) {
-            if card.keyword == keyword {
-                let set = card.parameter("ELSET").unwrap_or_default();
-                let members = self.mesh.sets.elements_of(scope.instance, set).ok_or_else(|| {
-                    let message = format!("*{}: element set `{set}` is unknown", card.title);
-                    let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
-                    vec![diagnostic.with_help("name an element set that the deck defines")]
-                })?;
-                cards.extend(members.into_iter().map(|id| (id, card)));
-            }
+    fn cards(&self, scope: &PlacedScope, keyword: &str) -> Diagnosed<(Vec<&'d Card>, HashMap<i64, usize>)> {
+        let cards = scope.scope.cards.iter().map(|at| &self.deck.cards()[*at]);
+        let cards: Vec<&Card> = cards.filter(|card| card.keyword == keyword).collect();
+        let mut of_elements = HashMap::new();
+        for (at, card) in cards.iter().enumerate() {
+            let set = card.parameter("ELSET").unwrap_or_default();
+            let members = self.mesh.sets.elements_of(scope.instance, set).ok_or_else(|| {
+                let message = format!("*{}: element set `{set}` is unknown", card.title);
+                let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
+                vec![diagnostic.with_help("name an element set that the deck defines")]
+            })?;
+            of_elements.extend(members.into_iter().map(|id| (id, at)));
         }
-        Ok(cards)
+        Ok((cards, of_elements))
     }
 
     /// Returns the sections of a scope.
@@ -197,20 +198,9 @@ impl<'d> Describing<'d> {
             let of_elements = elements.map(|(id, _)| (*id, 0)).collect();
             return Ok(Sections { all: vec![Ok(section)], of_elements });
         }
-        let mut places: HashMap<*const Card, usize> = HashMap::new();
-        let mut sections = Sections { all: Vec::new(), of_elements: HashMap::new() };
-        for (id, card) in self.last_cards(scope, "SOLIDSECTION")? {
-            let at = match places.get(&std::ptr::from_ref(card)) {
-                Some(at) => *at,
-                None => {
-                    sections.all.push(self.section(scope, card)?);
-                    places.insert(card, sections.all.len() - 1);
-                    sections.all.len() - 1
-                }
-            };
-            sections.of_elements.insert(id, at);
-        }
-        Ok(sections)
+        let (cards, of_elements) = self.cards(scope, "SOLIDSECTION")?;
+        let all = cards.into_iter().map(|card| self.section(scope, card)).collect::<Diagnosed<_>>()?;
+        Ok(Sections { all, of_elements })
     }
 
     /// Reads material and axes of a *SOLID SECTION.

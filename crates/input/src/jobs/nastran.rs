@@ -5,6 +5,7 @@ mod bulk;
 mod carried_mass;
 mod constraints;
 mod control_sections;
+mod described;
 mod elimination;
 mod matrices;
 mod systems;
@@ -13,13 +14,15 @@ use super::job::{JobFile, JobModel, JobReader, condensed};
 use crate::bulk_cards::is_bulk_data;
 use crate::node_file::NodeFile;
 use bulk::Bulk;
+use described::described;
 use elimination::GridPlaces;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::BadLines;
+use flexbody_elements::{DescribedElements, NotDescribed};
 use flexbody_model::{Elements, NodeAxes as Axes, Nodes};
 use matrices::Matrices;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use systems::Systems;
 
@@ -46,7 +49,7 @@ impl JobReader for Nastran {
         true
     }
 
-    fn read(&self, job: &JobFile, _describe: bool) -> Diagnosed<JobModel> {
+    fn read(&self, job: &JobFile, describe: bool) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
         let mut bulk = Bulk::read(path)?;
         if bulk.grids.is_empty() {
@@ -56,7 +59,17 @@ impl JobReader for Nastran {
         let (nodes, axes) = places(&bulk)?;
         let dmigs = std::mem::take(&mut bulk.dmigs);
         let places = GridPlaces::new(&nodes, &axes);
+        let has_other_matrices = !dmigs.names().is_empty() && bulk.has_elements;
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
+        let described = if describe {
+            let mut described = described(path, &nodes, &bulk, &places, has_other_matrices)?;
+            let (equations, not_described) = matrices.equations(&places);
+            described.equations = equations;
+            described.not_described.extend(not_described);
+            Some(described)
+        } else {
+            None
+        };
         let mut diagnostics = deck_notes(&bulk, path);
         let matrices = matrices.without_followers(&mut diagnostics).turned(&axes)?;
         let matrices = matrices.without_empty_rows(&mut diagnostics);
@@ -84,7 +97,7 @@ impl JobReader for Nastran {
             elements,
             files,
             diagnostics,
-            described: None,
+            described,
         })
     }
 }
@@ -136,6 +149,22 @@ pub(crate) fn nodes_of_bulk(path: &Path) -> Diagnosed<NodeFile> {
     let sets = bulk.sets.of(&bulk.grids);
     let followers = bulk.constraints.followers();
     Ok(NodeFile { nodes, sets, elements: bulk.elements, followers, ..NodeFile::default() })
+}
+
+/// Describes the elements of a deck for matrices from other files.
+///
+/// # Errors
+/// The errors of [`Bulk::read`]; FB110 for cards of elements and materials that cannot be read.
+pub(crate) fn elements_of_bulk(path: &Path) -> Diagnosed<DescribedElements> {
+    let bulk = Bulk::read(path)?;
+    let (nodes, axes) = places(&bulk)?;
+    let mut found = described(path, &nodes, &bulk, &GridPlaces::new(&nodes, &axes), false)?;
+    for (name, rows) in bulk.constraints.followers() {
+        let what = format!("{name}: constraints are described with the matrices of the job only");
+        let nodes = rows.iter().map(|row| row.node).collect::<BTreeSet<i64>>().into_iter().collect();
+        found.not_described.push(NotDescribed { what, line: None, nodes });
+    }
+    Ok(found)
 }
 
 /// Returns warnings and notes about the deck.

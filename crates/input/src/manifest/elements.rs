@@ -8,7 +8,8 @@ use flexbody_elements::Elasticity;
 use std::ops::Range;
 use std::path::Path;
 
-const ELEMENTS: &[&str] = &["file", "set", "kind", "youngs_modulus", "poisson_ratio", "elasticity"];
+pub(super) const ELEMENTS: &[&str] =
+    &["file", "set", "kind", "youngs_modulus", "poisson_ratio", "elasticity"];
 
 impl ManifestWalk<'_, '_> {
     /// Reads the files of elements. Entries with errors are left out; the errors are in `found`.

@@ -127,7 +127,9 @@ impl Constraints<'_> {
     }
 
     /// Notes a card that is not described.
-    fn leave_out(&mut self, card: &Card, reason: &str, nodes: Vec<i64>) {
+    fn leave_out(&mut self, card: &Card, reason: &str, mut nodes: Vec<i64>) {
+        nodes.sort_unstable();
+        nodes.dedup();
         let what = format!("*{}: {reason}", card.title);
         self.not_described.push(NotDescribed { what, line: self.deck.line(card), nodes });
     }
@@ -154,7 +156,6 @@ impl Constraints<'_> {
                 with_rows.push(dependent.0);
             }
         }
-        with_rows.dedup();
         if !with_rows.is_empty() {
             self.leave_out(card, "its dependent degrees of freedom have rows", with_rows);
         }

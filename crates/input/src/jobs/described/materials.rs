@@ -5,7 +5,6 @@ use crate::element_source::{ANISOTROPIC_CONSTANTS, anisotropic};
 use flexbody_base::diagnostic::{Code, Diagnosed};
 use flexbody_base::text::scanner::{excerpt, real};
 use flexbody_elements::Elasticity;
-use nalgebra::Matrix6;
 use std::collections::HashMap;
 
 /// Keywords of a material without effect on the initial stiffness.
@@ -112,19 +111,6 @@ fn material(deck: &Deck, cards: &[&Card]) -> Diagnosed<Material> {
         ]);
     }
     Ok(form.elasticity(&numbers).ok_or_else(|| "its elasticity is not positive definite".to_owned()))
-}
-
-/// Returns true if a material has the same elasticity along all axes, to rounding.
-pub(super) fn is_isotropic(elasticity: &Elasticity) -> bool {
-    let mean = |entries: [(usize, usize); 3]| entries.iter().map(|at| elasticity.0[*at]).sum::<f64>() / 3.0;
-    let (lambda, mu) = (mean([(0, 1), (1, 2), (0, 2)]), mean([(3, 3), (4, 4), (5, 5)]));
-    let expected = Matrix6::from_fn(|i, j| match (i == j, i < 3 && j < 3) {
-        (true, true) => lambda + 2.0 * mu,
-        (true, false) => mu,
-        (false, true) => lambda,
-        (false, false) => 0.0,
-    });
-    (elasticity.0 - expected).amax() <= 1e-14 * elasticity.0.amax()
 }
 
 /// Form in which an elasticity is written.

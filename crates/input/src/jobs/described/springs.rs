@@ -16,8 +16,9 @@ type Spring = Result<(Vec<u8>, f64), String>;
 pub(super) struct Springs<'d> {
     pub deck: &'d Deck,
     pub mesh: &'d DeckMesh,
-    /// Card of every element with a *SPRING.
-    pub cards: HashMap<i64, &'d Card>,
+    /// Cards *SPRING, and the place of the card of each element.
+    pub cards: Vec<&'d Card>,
+    pub of_elements: HashMap<i64, usize>,
     pub rows: &'d Rows<'d>,
 }
 
@@ -35,18 +36,17 @@ impl Springs<'_> {
     /// FB110 for *SPRING that cannot be read.
     pub(super) fn read(&self, kind: &str, members: &[(i64, Vec<i64>)], shift: i64) -> Diagnosed<ReadSprings> {
         let mut read = ReadSprings::default();
-        let mut known: HashMap<*const Card, Spring> = HashMap::new();
+        let mut known: HashMap<usize, Spring> = HashMap::new();
         for (id, nodes) in members {
             let nodes: Vec<i64> = nodes.iter().map(|node| node + shift).collect();
-            let Some(card) = self.cards.get(id).copied() else {
+            let Some(at) = self.of_elements.get(id) else {
                 read.others.push(("no *SPRING".to_owned(), nodes));
                 continue;
             };
-            let key = std::ptr::from_ref(card);
-            if !known.contains_key(&key) {
-                known.insert(key, self.spring(kind, card)?);
+            if !known.contains_key(at) {
+                known.insert(*at, self.spring(kind, self.cards[*at])?);
             }
-            let made = match &known[&key] {
+            let made = match &known[at] {
                 Ok((directions, constant)) => self.stiffness(kind, id + shift, &nodes, directions, *constant),
                 Err(reason) => Err(reason.clone()),
             };

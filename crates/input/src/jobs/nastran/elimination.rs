@@ -47,7 +47,7 @@ impl<'b> GridPlaces<'b> {
     }
 
     /// Returns the unit vector along a component.
-    fn axis(&self, (grid, component): Point) -> Vector3<f64> {
+    pub(super) fn axis(&self, (grid, component): Point) -> Vector3<f64> {
         let k = usize::from(component.max(1) - 1) % 3;
         match self.axes.get(&grid) {
             Some(axes) => Vector3::from(axes[k]),

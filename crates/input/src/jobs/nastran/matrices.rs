@@ -11,11 +11,12 @@ use crate::matrices::output4;
 use crate::matrices::turn::Turn;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_elements::{Equation, NotDescribed};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
     DofLabel, GivenRows, NodeAxes as Axes, Nodes, RawFollowers, RawMatrix, RowMap, filled_rows,
 };
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// K and M with the labels of their rows.
@@ -111,6 +112,53 @@ impl Matrices {
             turn: None,
             retained: None,
         })
+    }
+
+    /// Returns the equations of the rows that follow others, along the axes of the model, and those that are not described:
+    /// a grid with axes of its own whose displacements, or rotations, do not all follow others.
+    pub(super) fn equations(&self, places: &GridPlaces<'_>) -> (Vec<Equation>, Vec<NotDescribed>) {
+        let Some((elimination, _)) = &self.followers else { return (Vec::new(), Vec::new()) };
+        let left: HashSet<Point> = elimination.points.iter().copied().collect();
+        let mut sums: BTreeMap<Point, BTreeMap<Point, f64>> = BTreeMap::new();
+        for (column, label) in self.labels.iter().enumerate() {
+            let point = (label.node, label.direction);
+            if left.contains(&point) {
+                continue;
+            }
+            // Each term along the axes of the model.
+            let mut sum: BTreeMap<Point, f64> = BTreeMap::new();
+            let (rows, factors) = elimination.follows.column(column);
+            for (row, factor) in rows.iter().zip(factors) {
+                let leader = elimination.points[*row as usize];
+                along_model(leader, places)
+                    .for_each(|(term, part)| *sum.entry(term).or_default() += part * factor);
+            }
+            sums.insert(point, sum);
+        }
+        let (mut equations, mut open) = (Vec::new(), BTreeSet::new());
+        for &(grid, component) in sums.keys() {
+            let first = if component > 3 { 4 } else { 1 };
+            let own = [0, 1, 2].map(|k| sums.get(&(grid, first + k)));
+            let mut terms: BTreeMap<Point, f64> = BTreeMap::new();
+            if !places.are_turned(grid) || component == 0 {
+                terms.clone_from(&sums[&(grid, component)]);
+            } else if let [Some(x), Some(y), Some(z)] = own {
+                // Component of the model: the sum of the displacements along the axes of the grid.
+                for (k, sum) in (0u8..).zip([x, y, z]) {
+                    let part = places.axis((grid, first + k))[usize::from(component - first)];
+                    sum.iter().for_each(|(term, factor)| *terms.entry(*term).or_default() += part * factor);
+                }
+            } else {
+                open.insert(grid);
+                continue;
+            }
+            let terms = terms.into_iter().filter(|(_, factor)| *factor != 0.0).collect();
+            equations.push(Equation { dependent: (grid, component), terms });
+        }
+        let what = "constraints of some components of grids with axes of their own (CD)".to_owned();
+        let nodes: Vec<i64> = open.into_iter().collect();
+        let not_described = (!nodes.is_empty()).then_some(NotDescribed { what, line: None, nodes });
+        (equations, not_described.into_iter().collect())
     }
 
     /// Returns the matrices without the rows that follow others by constraints of the deck.
@@ -307,6 +355,17 @@ fn followers(
         return Ok(None);
     }
     Followers::new(&open, places).map(Some).map_err(one)
+}
+
+/// Returns the components along the axes of the model, with their factors, of a component along those of its grid.
+fn along_model((grid, component): Point, places: &GridPlaces<'_>) -> impl Iterator<Item = (Point, f64)> {
+    let is_turned = places.are_turned(grid) && component > 0;
+    let first = if component > 3 { 4 } else { 1 };
+    let axis = places.axis((grid, component));
+    let all =
+        (0u8..3).map(move |k| ((grid, first + k), axis[usize::from(k)])).filter(|(_, part)| *part != 0.0);
+    let own = std::iter::once(((grid, component), 1.0));
+    all.filter(move |_| is_turned).chain(own.filter(move |_| !is_turned))
 }
 
 /// Returns the rows `retained` (ascending) and the same columns of a matrix that has no entries elsewhere.

@@ -85,6 +85,17 @@ struct System {
     axes: [[f64; 3]; 3],
 }
 
+/// Axes of a system in the basic system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum SystemAxes {
+    /// Unit vectors along x, y, z.
+    Fixed([[f64; 3]; 3]),
+    /// Point of the axis of a cylindrical system, and its direction.
+    Cylinder { origin: [f64; 3], along: [f64; 3] },
+    /// Spherical system.
+    Sphere,
+}
+
 const BASIC: System = System {
     kind: SystemKind::Rectangular,
     origin: [0.0; 3],
@@ -120,6 +131,19 @@ impl<'b> Systems<'b> {
     /// The errors of [`position`](Self::position).
     pub(super) fn axes(&mut self, grid: &Grid, x: [f64; 3]) -> Result<[[f64; 3]; 3], Diagnostic> {
         Ok(self.system(grid.axes.unwrap_or(0))?.axes_at(x))
+    }
+
+    /// Returns the axes of a material along a system.
+    ///
+    /// # Errors
+    /// The errors of [`position`](Self::position).
+    pub(super) fn of_material(&mut self, id: i64) -> Result<SystemAxes, Diagnostic> {
+        let System { kind, origin, axes } = self.system(id)?;
+        Ok(match kind {
+            SystemKind::Rectangular => SystemAxes::Fixed(axes),
+            SystemKind::Cylindrical => SystemAxes::Cylinder { origin, along: axes[2] },
+            SystemKind::Spherical => SystemAxes::Sphere,
+        })
     }
 
     fn system(&mut self, id: i64) -> Result<System, Diagnostic> {
