@@ -149,11 +149,12 @@ impl Model {
     pub fn read_for(body: &FlexBody, path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let is_manifest = path.extension().is_some_and(|extension| extension == "toml");
-        let files = if is_manifest {
+        let mut files = if is_manifest {
             read_manifest(path)?
         } else {
             ModelFiles::from_job(path, None, Vec::new(), None)?
         };
+        files.describe_elements |= !StressLoads::recorded(&body.0.source().settings).is_empty();
         let CheckedModel { model, diagnostics, .. } = model_of(&body.0, read_model(&files)?)?;
         Ok(Self { checked: model, residual_vectors: files.residual_vectors, diagnostics })
     }

@@ -5,6 +5,7 @@ use super::models::of_manifest_or_job;
 use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_body::convert::StressLoads;
 use flexbody_body::verification::{Checks, model_of};
 use flexbody_input::read_model;
 use flexbody_report::{checks_json, checks_text};
@@ -17,7 +18,8 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let model = match &arguments.against {
         Some(path) => {
-            let files = of_manifest_or_job(path, &arguments.job)?;
+            let mut files = of_manifest_or_job(path, &arguments.job)?;
+            files.describe_elements |= !StressLoads::recorded(&body.source().settings).is_empty();
             Some(model_of(&body, read_model(&files)?)?.model)
         }
         None => None,

@@ -7,8 +7,8 @@ mod recoveries;
 use super::recounts::{interface_checks, interface_note, recounts};
 use crate::basis::BasisKind;
 use crate::convert::{
-    BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, poor_fits, rigid_mass, unit_rotations,
-    unusual_node_inertia,
+    BodyModes, NodesInFrame, StressLoads, StressedModes, modal_damping, modal_geometric_stiffness, poor_fits,
+    rigid_mass, stress_stiffness, unit_rotations, unusual_node_inertia,
 };
 use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage, joined};
 use crate::invariants::{
@@ -19,6 +19,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::numbers::significant;
 use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry, side_by_side};
 use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
 use nalgebra::Vector3;
@@ -26,6 +27,13 @@ use recoveries::recovery_checks;
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
 const MAX_RECOMPUTED_DIFFERENCE: f64 = 1e-12;
+
+/// Limit of recomputed stress stiffness, relative to the largest of its load: static responses are accurate to 1e-8, and
+/// stresses are differences of displacements.
+const MAX_STRESS_DIFFERENCE: f64 = 1e-6;
+
+/// Roundings of stored numbers that an entry of it may show: it sums products of stored modes.
+const ROUNDINGS: f64 = 100.0;
 
 /// Name of K_ff in [`primary_differences`].
 const STIFFNESS: &str = "modal_stiffness";
@@ -296,7 +304,8 @@ impl<'a> Recomputed<'a> {
     }
 
     fn geometric_stiffness(&self) -> Result<Option<IdentityCheck>> {
-        let found = geometric_check(self.body, self.model, &self.modes.vectors)?;
+        let modal_stiffness = gram(self.modes.vectors.as_ref(), self.kx.as_ref());
+        let found = geometric_check(self.body, self.model, &self.modes.vectors, &modal_stiffness)?;
         Ok(found.map(|found| {
             let formula = "Psi' K_geo Psi for every unit load";
             IdentityCheck::new("geometric_stiffness_recomputed", formula, found.largest, found.allowed)
@@ -453,13 +462,29 @@ fn damping_check(
 }
 
 /// Compares the stored geometric stiffness with that of the model. Returns `None` if neither has any.
-fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
+///
+/// # Errors
+/// The errors of stress stiffness that the body had computed from the elements of its deck.
+fn geometric_check(
+    body: &FlexBody,
+    model: &FeModel,
+    shapes: &Mat<f64>,
+    modal_stiffness: &Mat<f64>,
+) -> Result<Option<Difference>> {
     let shift = match body.conditions() {
         // The model gives geometric stiffness about the centre of mass.
         ReferenceConditions::Interface(_) => -body.invariants().first_moment() / body.invariants().mass(),
         _ => Vector3::zeros(),
     };
-    let (mut found, rotated) = modal_geometric_stiffness(model, shapes, Vec::new(), body.frame(), &shift)?;
+    let of = StressedModes {
+        modes: shapes,
+        modal_stiffness,
+        lowest: body.modes().eigenvalue.iter().copied().fold(f64::INFINITY, f64::min),
+        frame: body.frame(),
+    };
+    let wanted = StressLoads::recorded(&body.source().settings);
+    let computed = stress_stiffness(model, wanted, &of, &Context::QUIET)?;
+    let (mut found, rotated) = modal_geometric_stiffness(model, shapes, computed, body.frame(), &shift)?;
     let (mut stored, mut shapes) = (body.geometric_stiffness().to_vec(), shapes.clone());
     let stored_rotated = &body.parts().rotated_stiffness;
     if !stored_rotated.is_empty() {
@@ -480,8 +505,12 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
         let (stored, recomputed) = (matrix_of(&stored, load), matrix_of(&found, load));
         // Every component of the kind may contribute.
         let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
-        let rounding = given.map(|one| rounding_of(&one.matrix, &shapes, body.storage())).sum();
+        let of_given: f64 = given.map(|one| rounding_of(&one.matrix, &shapes, body.storage())).sum();
         let size = stored.norm_max().max(recomputed.norm_max());
+        // What is computed from elements is as accurate as the static response to the load.
+        let is_given = model.geometric_stiffness().iter().any(|one| one.load.kind == load.kind);
+        let computed = MAX_STRESS_DIFFERENCE + ROUNDINGS * body.storage().rounding();
+        let rounding = if is_given { of_given } else { size * computed };
         Difference::new(largest_entry((&stored - &recomputed).as_ref()), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))

@@ -33,3 +33,4 @@ pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
 pub use shapes::{RecoveryShapes, ShapeColumn, UNIFORM_STRAIN, load_shapes, recovery_shapes};
 pub use stress_stiffness::StressLoads;
+pub(crate) use stress_stiffness::{StressedModes, stress_stiffness};

@@ -50,6 +50,13 @@ impl StressLoads {
         Ok(wanted)
     }
 
+    /// Returns the kinds of loads that the settings of a body record.
+    pub fn recorded(settings: &serde_json::Value) -> Self {
+        let names = settings["stress_stiffness"].as_array().into_iter().flatten();
+        let names: Vec<&str> = names.filter_map(serde_json::Value::as_str).collect();
+        Self::parse(&names.join(",")).unwrap_or_default()
+    }
+
     /// Returns the names of the kinds of loads that are wanted.
     pub fn names(self) -> Vec<&'static str> {
         let kinds = [self.spin, self.interfaces, self.loads];
@@ -70,7 +77,7 @@ impl StressLoads {
 }
 
 /// Modes whose stress stiffness is wanted.
-pub(super) struct StressedModes<'a> {
+pub(crate) struct StressedModes<'a> {
     /// Modes of the body by the rows of the model (N x nf).
     pub modes: &'a Mat<f64>,
     /// Psi' K Psi.
@@ -86,7 +93,7 @@ pub(super) struct StressedModes<'a> {
 ///
 /// # Errors
 /// [`ElementsUnproved`](flexbody_base::diagnostic::Code::ElementsUnproved); failures of the factor.
-pub(super) fn stress_stiffness(
+pub(crate) fn stress_stiffness(
     model: &FeModel,
     wanted: StressLoads,
     of: &StressedModes<'_>,
