@@ -39,7 +39,7 @@ pub(super) struct Requested {
 /// Describes the elements of a deck whose scopes were kept.
 ///
 /// # Errors
-/// FB110 for cards that cannot be read, FB116 for an unknown set.
+/// FB110 for cards that cannot be read, FB220 for an unknown set.
 pub(super) fn described(
     deck: &Deck,
     mesh: &DeckMesh,

@@ -33,7 +33,7 @@ pub(super) struct DescribedFiles {
 /// Reads the elements of files. `labels` are those of the rows of K.
 ///
 /// # Errors
-/// FB101 to FB111 for files that cannot be read; FB116 for unknown sets; FB201 for meshes without a stated elasticity.
+/// FB101 to FB111 for files that cannot be read; FB220 for unknown sets; FB201 for meshes without a stated elasticity.
 pub(super) fn described_of_files(
     sources: &[ElementSource],
     opened: &OpenFiles,
