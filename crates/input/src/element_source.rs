@@ -30,9 +30,8 @@ pub(super) fn anisotropic(constants: &[f64]) -> Option<Elasticity> {
     let mut matrix = Matrix6::zeros();
     let mut rest = constants.iter();
     // The upper triangle, column by column.
-    for column in 0..6 {
-        for row in 0..=column {
-            let (i, j) = (FROM_DECK[row], FROM_DECK[column]);
+    for (column, &j) in FROM_DECK.iter().enumerate() {
+        for &i in &FROM_DECK[..=column] {
             matrix[(i, j)] = *rest.next()?;
             matrix[(j, i)] = matrix[(i, j)];
         }

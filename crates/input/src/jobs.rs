@@ -35,7 +35,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) use calculix::read_stiffness as read_calculix_stiffness;
 pub use deck_of_elements::ElementDeck;
-pub(super) use described_file::{describe_deck, is_described_by_deck};
+pub(super) use described_file::{begins_like_deck, describe_deck, is_described_by_deck};
 pub use job::JobFile;
 pub(super) use job::JobModel;
 pub(super) use nastran::{elements_of_bulk, nodes_of_bulk};

@@ -15,7 +15,7 @@ pub(super) use vtk_legacy::point_arrays as legacy_point_arrays;
 pub(super) use vtk_xml::{CollectionMember, collection, pieces, point_arrays};
 
 use super::bulk_cards::is_bulk_data;
-use super::jobs::{nodes_of_bulk, nodes_of_deck};
+use super::jobs::{begins_like_deck, nodes_of_bulk, nodes_of_deck};
 use super::node_file::NodeFile;
 use super::tables::read_nodes;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
@@ -36,7 +36,7 @@ const FORMATS: &[Format] = &[
     Format { recognises: vtk_legacy::recognises, read: vtk_legacy::read },
     Format { recognises: exodus::recognises, read: exodus::read },
     Format { recognises: cdb::recognises, read: cdb::read },
-    Format { recognises: is_deck, read: nodes_of_deck },
+    Format { recognises: begins_like_deck, read: nodes_of_deck },
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
     Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
 ];
@@ -81,13 +81,6 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Diagnosed<NodeF
         return wrong(Code::TableRow, message);
     }
     Ok(read)
-}
-
-/// Returns true when a file is a keyword deck: its first line that is no comment is a keyword.
-pub(super) fn is_deck(head: &str) -> bool {
-    let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
-    first
-        .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
 fn bulk(file: &InputFile) -> Diagnosed<NodeFile> {

@@ -17,6 +17,7 @@ mod with_stress;
 
 use super::mesh::MeshReading;
 use super::model_files::{ModelFiles, ModelSource, NamedLoadSource};
+use super::node_file::NodeFile;
 use described::{DescribedFiles, described_of_files};
 use diagnostics::{collect, take};
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
@@ -24,7 +25,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::Sources;
 use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_model::{
-    GeometricStiffness, GivenRows, ModelData, ModelLoad, NodeSet, RawMatrix, RawModel, UnitLoad,
+    GeometricStiffness, GivenRows, ModelData, ModelLoad, NodeSet, RawMatrix, RawModel, SurfaceMesh, UnitLoad,
 };
 use interfaces::NodeLookup;
 use labels_of_file::LabelsOfFile;
@@ -114,13 +115,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     let recoveries = recoveries(&places, opened, files, &mut diagnostics);
     let nodal_stresses = nodal_stresses(&places, opened, files, &mut diagnostics);
     let named_loads = read_loads(opened, files, &mut diagnostics);
-    let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
-    let mesh = matrices.as_ref().map(|matrices| {
-        let from = mesh_file.as_ref().zip(files.mesh.as_deref());
-        MeshReading { nodes: &matrices.nodes, elements: &matrices.elements, path: &matrices.nodes_path }
-            .mesh(from)
-    });
-    let mesh = mesh.and_then(|mesh| take(&mut diagnostics, mesh));
+    let mesh = surface(parsed.mesh, matrices.as_ref(), files, &mut diagnostics);
     diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
     let described = matrices.as_ref().filter(|_| !files.elements.is_empty()).and_then(|matrices| {
         let labels = matrices.plain(files.dimension).labels;
@@ -164,6 +159,19 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         diagnostics,
     };
     Ok((model, matrices.files.into_iter().chain(more_files).collect()))
+}
+
+/// Returns the surface of the model with the notes about it; adds errors.
+fn surface(
+    mesh: Option<Diagnosed<NodeFile>>,
+    matrices: Option<&ModelMatrices>,
+    files: &ModelFiles,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<(Option<SurfaceMesh>, Vec<Diagnostic>)> {
+    let mesh_file = mesh.and_then(|mesh| take(diagnostics, mesh));
+    let ModelMatrices { nodes, elements, nodes_path, .. } = matrices?;
+    let from = mesh_file.as_ref().zip(files.mesh.as_deref());
+    take(diagnostics, MeshReading { nodes, elements, path: nodes_path }.mesh(from))
 }
 
 /// Returns the geometric stiffness of every load that could be read; adds errors. Also returns the number of digits that

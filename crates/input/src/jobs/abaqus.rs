@@ -4,7 +4,7 @@
 
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::described::{DescribedRows, Program, Requested, described};
+use super::described::{DescribedRows, Program, Requested, described, nothing};
 use super::element_kinds::{family, has_internal_nodes};
 use super::job::{FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
@@ -51,12 +51,14 @@ impl JobReader for Abaqus {
             (Err(missing), None) => return Err(missing),
         };
         let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
-        let described = if describe {
+        let described = if !describe {
+            None
+        } else if rows.condensed.is_some() {
+            Some(nothing(&deck, "the matrices are condensed"))
+        } else {
             let no_rotations = HashMap::new();
             let labels = DescribedRows::new(Program::Abaqus, &rows.labels, &no_rotations);
             Some(described(&deck, &mesh, &labels, &Requested::default())?)
-        } else {
-            None
         };
         let deck_files = deck.seen()?.into_iter();
         Ok(JobModel {

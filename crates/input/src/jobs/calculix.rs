@@ -5,7 +5,7 @@ use super::couplings::Coupling;
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
-use super::described::{DescribedRows, Program, Requested, described, expanded};
+use super::described::{DescribedRows, Program, Requested, described, nothing};
 use super::expanded::{Once, copies_in_sets, label_once};
 use super::job::{JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
@@ -114,7 +114,8 @@ fn described_job(
     is_expanded: bool,
 ) -> Diagnosed<DescribedElements> {
     if is_expanded {
-        return Ok(expanded(deck));
+        let reason = "elements that CalculiX expands into solids: shells and beams are not described";
+        return Ok(nothing(deck, reason));
     }
     let rows = DescribedRows::new(Program::Calculix, labels, rotations);
     described(deck, mesh, &rows, &Requested::default())

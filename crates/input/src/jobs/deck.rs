@@ -379,4 +379,26 @@ mod tests {
         fs::write(&path, "*INCLUDE, INPUT=job.inp\n").expect("written");
         assert!(Deck::read(&path).err().expect("refused")[0].message().contains("levels deep"));
     }
+
+    #[test]
+    fn packed_decks_are_unpacked_within_limits() {
+        use std::io::Write;
+        let folder = tempfile::tempdir().expect("a folder");
+        let packed = |name: &str, text: &[u8]| {
+            let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+            packer.write_all(text).expect("packed");
+            let bytes = packer.finish().expect("packed");
+            let path = folder.path().join(name);
+            fs::write(&path, &bytes).expect("written");
+            (path, bytes)
+        };
+        let (path, bytes) = packed("job.inp.gz", b"*NODE\n1, 0, 0, 0\n*END STEP\n");
+        let deck = Deck::read(&path).expect("a deck");
+        assert_eq!(texts(&deck, &deck.cards()[0]), [(2, "1, 0, 0, 0".to_owned())]);
+        fs::write(&path, &bytes[..bytes.len() - 12]).expect("written");
+        assert_eq!(Deck::read(&path).err().expect("refused")[0].code(), Code::FileCompressionBroken);
+        let (path, _) = packed("bomb.inp.gz", &vec![b'\n'; PIECE_BYTES + (1 << 20)]);
+        let refused = Deck::read(&path).err().expect("refused");
+        assert!(refused[0].message().contains("more than 200 times its size"), "{}", refused[0].message());
+    }
 }

@@ -39,7 +39,7 @@ pub(super) struct Requested {
 /// Describes the elements of a deck whose scopes were kept.
 ///
 /// # Errors
-/// FB110 for cards that cannot be read, FB116 for an unknown set.
+/// FB110 for cards that cannot be read, FB220 for an unknown set.
 pub(super) fn described(
     deck: &Deck,
     mesh: &DeckMesh,
@@ -73,11 +73,9 @@ pub(super) fn described(
     Ok(with_internal_nodes(described, rows, |node| mesh.nodes.contains_key(&node)))
 }
 
-/// Returns the description of a deck whose matrices have rows of solids into which the program expanded its shells:
-/// nothing is described.
-pub(super) fn expanded(deck: &Deck) -> DescribedElements {
-    let what = "elements that CalculiX expands into solids: shells and beams are not described".to_owned();
-    let not_described = vec![NotDescribed { what, line: None, nodes: Vec::new() }];
+/// Returns the description of a deck of which nothing is described, with the reason in words.
+pub(super) fn nothing(deck: &Deck, reason: &str) -> DescribedElements {
+    let not_described = vec![NotDescribed { what: reason.to_owned(), line: None, nodes: Vec::new() }];
     DescribedElements { not_described, path: deck.path().to_path_buf(), ..DescribedElements::default() }
 }
 

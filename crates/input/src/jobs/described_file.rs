@@ -4,7 +4,6 @@ use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::described::{DescribedRows, Program, Requested, described};
 use crate::element_source::ElementSource;
-use crate::node_files::is_deck;
 use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::scanner::integer;
@@ -17,16 +16,23 @@ use std::collections::{HashMap, HashSet};
 const HEAD: usize = 4096;
 
 /// Returns true if a file, compressed or not, is a keyword deck.
-pub(in super::super) fn is_described_by_deck(file: &InputFile) -> bool {
+pub(crate) fn is_described_by_deck(file: &InputFile) -> bool {
     let head = Compression::of(file.bytes()).head(file, HEAD);
-    is_deck(&String::from_utf8_lossy(&head))
+    begins_like_deck(&String::from_utf8_lossy(&head))
+}
+
+/// Returns true when a text begins like a keyword deck: its first line that is no comment is a keyword.
+pub(crate) fn begins_like_deck(head: &str) -> bool {
+    let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
+    first
+        .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
 /// Describes the elements of a deck by the rows of the matrices. Returns also the files that the deck includes.
 ///
 /// # Errors
 /// FB101 to FB106 for files that cannot be read, FB110 and FB111 for decks that cannot be read.
-pub(in super::super) fn describe_deck(
+pub(crate) fn describe_deck(
     source: &ElementSource,
     labels: &[DofLabel],
 ) -> Diagnosed<(DescribedElements, Vec<SeenFile>)> {

@@ -10,9 +10,9 @@ use crate::node_file::NodeFile;
 use crate::node_files::read_node_file;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::text::InputFile;
-use flexbody_elements::{Axes, DescribedElements, Elasticity, ElementGroup, Section};
+use flexbody_elements::{Axes, DescribedElements, Elasticity, ElementGroup, NotDescribed, Section};
 use flexbody_model::DofLabel;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// Number of bytes in which bulk data are recognised: comments may precede their first card.
 const HEAD: usize = 1 << 20;
@@ -33,7 +33,7 @@ pub(super) struct DescribedFiles {
 /// Reads the elements of files. `labels` are those of the rows of K.
 ///
 /// # Errors
-/// FB101 to FB111 for files that cannot be read; FB116 for unknown sets; FB201 for meshes without a stated elasticity.
+/// FB101 to FB111 for files that cannot be read; FB220 for unknown sets; FB201 for meshes without a stated elasticity.
 pub(super) fn described_of_files(
     sources: &[ElementSource],
     opened: &OpenFiles,
@@ -98,7 +98,7 @@ fn of_mesh(file: &InputFile, source: &ElementSource) -> Diagnosed<DescribedEleme
     };
     let kind = source.kind.as_deref().unwrap_or(UNSTATED_KIND);
     let described = solids(&mesh, members.as_ref(), kind, elasticity);
-    if described.groups.is_empty() {
+    if described.groups.is_empty() && described.not_described.is_empty() {
         let message = "file has no solid elements".to_owned();
         return Err(refuse(Code::DeckUnsupported, message, "name a mesh of solid elements, or another set"));
     }
@@ -120,10 +120,15 @@ fn solids(
         mesh.nodes.ids.iter().copied().zip(mesh.nodes.positions.iter().copied()).collect();
     let is_meant =
         |nodes: &[i64]| members.is_none_or(|members| nodes.iter().all(|node| members.contains(node)));
-    let mut groups = BTreeMap::new();
+    let (mut groups, mut repeated) = (BTreeMap::new(), Vec::new());
     let mut described = DescribedElements::default();
     for ((shape, nodes), id) in mesh.elements.iter().zip(1..) {
         if !shape.is_solid() || !is_meant(nodes) || !nodes.iter().all(|node| places.contains_key(node)) {
+            continue;
+        }
+        // Programs drop functions of such elements, each in its own way.
+        if nodes.iter().collect::<HashSet<_>>().len() < nodes.len() {
+            repeated.push(nodes);
             continue;
         }
         described.positions.extend(nodes.iter().map(|node| (*node, places[node])));
@@ -144,6 +149,13 @@ fn solids(
         }
     }
     described.groups = groups.into_values().collect();
+    if !repeated.is_empty() {
+        let elements = if repeated.len() == 1 { "element" } else { "elements" };
+        let what = format!("{} {elements} with repeated nodes", repeated.len());
+        let nodes: BTreeSet<i64> = repeated.into_iter().flatten().copied().collect();
+        let nodes = nodes.into_iter().collect();
+        described.not_described.push(NotDescribed { what, line: None, nodes });
+    }
     described
 }
 
@@ -235,6 +247,16 @@ mod tests {
             read_model(&with(vec![steel.clone()])).expect("a model").described_elements.expect("elements");
         assert_eq!((all.groups.len(), all.groups[0].kind.as_str()), (1, "SOLID"));
         assert_eq!(all.groups[0].nodes, [1, 2, 3, 4, 2, 3, 4, 5]);
+        let wedge = fs::read_to_string(&steel.path).expect("read").replace("2 2 3 4 5", "2 2 2 4 5");
+        let degenerate = ElementSource { path: folder.path().join("wedge.msh"), ..steel.clone() };
+        fs::write(&degenerate.path, wedge).expect("written");
+        let found =
+            read_model(&with(vec![degenerate])).expect("a model").described_elements.expect("elements");
+        assert_eq!(found.groups[0].ids, [2]);
+        assert_eq!(
+            (found.not_described[0].what.as_str(), &found.not_described[0].nodes[..]),
+            ("1 element with repeated nodes", &[2, 4, 5][..])
+        );
         let part = ElementSource { set: Some("steel".to_owned()), ..steel };
         let part = read_model(&with(vec![part])).expect("a model").described_elements.expect("elements");
         assert_eq!(part.groups[0].nodes, [1, 2, 3, 4]);

@@ -108,6 +108,7 @@ impl Constraints<'_> {
                 Ok(())
             }
             "STEP" if card.parameter("PERTURBATION").is_some() => {
+                // CalculiX 2.20: without an earlier step, initial stresses have no effect.
                 if self.deck.cards().iter().filter(|card| card.keyword == "STEP").count() > 1 {
                     let reason = "the stiffness has the stress of an earlier step";
                     self.leave_out(card, reason, Vec::new());

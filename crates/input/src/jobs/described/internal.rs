@@ -29,9 +29,12 @@ pub(super) fn with_internal_nodes(
         .flat_map(|group| group.ids.iter().copied())
         .collect();
     elements.sort_unstable();
+    if elements.is_empty() {
+        return described;
+    }
     let others = rows.others(is_known);
     // Other programs eliminate the incompatible modes inside each element.
-    if elements.is_empty() || others.is_empty() {
+    if others.is_empty() {
         return described;
     }
     if others.len() != NODES_EACH * elements.len() {

@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// Program that assembled the matrices of a deck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum Program {
+pub(crate) enum Program {
     /// CalculiX: constraints are eliminated.
     Calculix,
     /// Abaqus.
@@ -15,7 +15,7 @@ pub(in super::super) enum Program {
 
 /// Rows of the matrices, and the nodes whose displacements are rotations.
 #[derive(Debug)]
-pub(in super::super) struct Rows<'r> {
+pub(crate) struct Rows<'r> {
     pub program: Program,
     labels: HashSet<DofLabel>,
     /// Reference node of each node whose displacements 1 to 3 are its rotations.
@@ -24,11 +24,7 @@ pub(in super::super) struct Rows<'r> {
 
 impl<'r> Rows<'r> {
     /// Creates the rows with the labels of the model, in which rotations are directions 4 to 6 of the reference nodes.
-    pub(in super::super) fn new(
-        program: Program,
-        labels: &[DofLabel],
-        rotations: &'r HashMap<i64, i64>,
-    ) -> Self {
+    pub(crate) fn new(program: Program, labels: &[DofLabel], rotations: &'r HashMap<i64, i64>) -> Self {
         Self { program, labels: labels.iter().copied().collect(), rotations }
     }
 

@@ -143,7 +143,10 @@ impl Cards {
             "CELAS2" => card.real(1).and_then(|k| self.spring(card, Constant::Stated(k), 2)),
             _ => match SOLIDS.iter().find(|(kind, _)| *kind == name) {
                 Some((_, most)) => self.solid(card, *most),
-                None => Some(self.other(card)),
+                None => {
+                    self.other(card);
+                    Some(())
+                }
             },
         };
         if read.is_none() {
