@@ -63,8 +63,8 @@ impl Formulation {
         Self::Hex20,
     ];
 
-    /// Returns the formulations that elements of a type (`C3D8`, `CHEXA`, in upper case) may have in FE programs, the most
-    /// likely first; empty if the type is unknown or has another number of nodes.
+    /// Returns the formulations that elements of a type (`C3D8`, `CHEXA`, in upper case; `SOLID` for a solid of unknown type)
+    /// may have in FE programs, the most likely first; empty if the type is unknown or has another number of nodes.
     pub fn candidates(kind: &str, nodes: usize) -> Vec<Self> {
         let candidates: &[Self] = match (kind, nodes) {
             ("C3D4" | "CTETRA", 4) => &[Self::Tet4],
@@ -79,6 +79,12 @@ impl Formulation {
             ("C3D20", 20) => &[Self::Hex20],
             ("C3D20R", 20) => &[Self::Hex20Reduced],
             ("CHEXA", 20) => &[Self::Hex20Reduced, Self::Hex20],
+            ("SOLID", 4) => &[Self::Tet4],
+            ("SOLID", 6) => &[Self::Wedge6Full, Self::Wedge6],
+            ("SOLID", 8) => &[Self::Hex8, Self::Hex8MeanDilatation, Self::Hex8UniformStrain],
+            ("SOLID", 10) => &[Self::Tet10],
+            ("SOLID", 15) => &[Self::Wedge15],
+            ("SOLID", 20) => &[Self::Hex20Reduced, Self::Hex20],
             _ => &[],
         };
         candidates.to_vec()

@@ -184,7 +184,11 @@ const ALL: StressLoads = StressLoads { spin: true, interfaces: true, loads: true
 
 fn assert_near(found: &Mat<f64>, expected: &Mat<f64>, allowed: f64, what: &str) {
     let difference = (found - expected).norm_max();
-    assert!(difference <= allowed * expected.norm_max(), "{what}: {difference:e} of {:e}", expected.norm_max());
+    assert!(
+        difference <= allowed * expected.norm_max(),
+        "{what}: {difference:e} of {:e}",
+        expected.norm_max()
+    );
 }
 
 #[test]

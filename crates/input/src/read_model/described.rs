@@ -184,7 +184,7 @@ mod tests {
     fn a_packed_deck_describes_the_elements_of_matrices_in_other_files() {
         let deck = fixture("models/bar_c3d8r/matrices.inp.gz");
         let model = read_model(&with(vec![source(deck.clone())])).expect("a model");
-        let described = model.described_elements.expect("elements");
+        let described = model.data.elements.expect("elements");
         let [group] = described.groups.as_slice() else { panic!("{:?}", described.groups) };
         assert_eq!((group.kind.as_str(), group.section.material.as_str()), ("C3D8R", "STEEL"));
         assert_eq!(group.nodes[..8], [1, 2, 13, 12, 45, 46, 57, 56]);
@@ -201,8 +201,7 @@ mod tests {
             elasticity: soft,
             ..source(deck.clone())
         };
-        let described =
-            read_model(&with(vec![stated])).expect("a model").described_elements.expect("elements");
+        let described = read_model(&with(vec![stated])).expect("a model").data.elements.expect("elements");
         assert_eq!(described.groups[0].kind, "C3D8");
         assert_eq!(Some(described.groups[0].section.elasticity), soft);
         assert_eq!(described.groups[0].ids.len(), group.ids.len());
@@ -225,9 +224,9 @@ mod tests {
         }
         let files = ModelFiles::from_job(&path, None, Vec::new(), None).expect("files");
         assert!(matches!(files.source, ModelSource::Job(_)));
-        assert_eq!(read_model(&files).expect("a model").described_elements, None);
+        assert_eq!(read_model(&files).expect("a model").data.elements, None);
         let asked = ModelFiles { describe_elements: true, ..files.clone() };
-        let described = read_model(&asked).expect("a model").described_elements.expect("elements");
+        let described = read_model(&asked).expect("a model").data.elements.expect("elements");
         assert_eq!(described.groups[0].ids, [5]);
         assert_eq!(described.path, path);
     }
@@ -243,22 +242,20 @@ mod tests {
         let refused = read_model(&with(vec![source(mesh.clone())])).expect_err("refused");
         assert!(refused.first_error().message().contains("no materials"), "{refused}");
         let steel = ElementSource { elasticity: Elasticity::isotropic(210e3, 0.3), ..source(mesh) };
-        let all =
-            read_model(&with(vec![steel.clone()])).expect("a model").described_elements.expect("elements");
+        let all = read_model(&with(vec![steel.clone()])).expect("a model").data.elements.expect("elements");
         assert_eq!((all.groups.len(), all.groups[0].kind.as_str()), (1, "SOLID"));
         assert_eq!(all.groups[0].nodes, [1, 2, 3, 4, 2, 3, 4, 5]);
         let wedge = fs::read_to_string(&steel.path).expect("read").replace("2 2 3 4 5", "2 2 2 4 5");
         let degenerate = ElementSource { path: folder.path().join("wedge.msh"), ..steel.clone() };
         fs::write(&degenerate.path, wedge).expect("written");
-        let found =
-            read_model(&with(vec![degenerate])).expect("a model").described_elements.expect("elements");
+        let found = read_model(&with(vec![degenerate])).expect("a model").data.elements.expect("elements");
         assert_eq!(found.groups[0].ids, [2]);
         assert_eq!(
             (found.not_described[0].what.as_str(), &found.not_described[0].nodes[..]),
             ("1 element with repeated nodes", &[2, 4, 5][..])
         );
         let part = ElementSource { set: Some("steel".to_owned()), ..steel };
-        let part = read_model(&with(vec![part])).expect("a model").described_elements.expect("elements");
+        let part = read_model(&with(vec![part])).expect("a model").data.elements.expect("elements");
         assert_eq!(part.groups[0].nodes, [1, 2, 3, 4]);
     }
 }
