@@ -122,7 +122,7 @@ pub use api::{
     GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, LoadedHistory, Matrix,
     MeasuredRun, ModePair, Model, ModelBuilder, Motion, MotionHistory, PointPath, Progress, Quantity, Ranges,
     Recipe, RecipeStep, Recovered, RecoveredRows, RecoveryRow, ReportFormat, Scene, Selection, SourceFile,
-    SparseMatrix, StressLoads, Tolerances, unit_names,
+    SparseMatrix, StressLoads, StressNodes, Tolerances, unit_names,
 };
 #[cfg(feature = "cluster")]
 pub use api::{Batch, BatchOptions, BatchedBody};

@@ -12,6 +12,7 @@ use crate::types::{Diagnostics, Floats};
 use crate::work::run;
 use flexbody::{
     Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, FlexBody, FrameChoice, ModelBuilder, SparseMatrix,
+    StressLoads, StressNodes,
 };
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -131,6 +132,34 @@ fn convert_options(
         options = options.frame(frame_choice(given)?);
     }
     Ok(options)
+}
+
+/// Returns the loads with these names, separated by commas.
+fn stress_loads(given: &Bound<'_, PyAny>) -> PyResult<StressLoads> {
+    let names = text(given, "geometric_stiffness")?;
+    StressLoads::parse(&names).map_err(|name| {
+        let message =
+            format!("`geometric_stiffness` names {name:?}, expected spin, interfaces, loads or none");
+        value_error(given.py(), message)
+    })
+}
+
+/// Returns the nodes that a caller means: `nodes`, `surface`, or their numbers.
+fn stress_nodes(given: &Bound<'_, PyAny>) -> PyResult<StressNodes> {
+    if let Ok(name) = given.extract::<String>() {
+        return match name.as_str() {
+            "nodes" => Ok(StressNodes::All),
+            "surface" => Ok(StressNodes::Surface),
+            _ => Err(value_error(
+                given.py(),
+                format!("`nodes` is {name:?}, expected \"nodes\", \"surface\" or numbers"),
+            )),
+        };
+    }
+    let numbers = given
+        .extract()
+        .map_err(|_| mistyped(given, "nodes", "\"nodes\", \"surface\" or numbers of nodes"))?;
+    Ok(StressNodes::These(numbers))
 }
 
 /// Returns the frame of this name.
@@ -319,7 +348,22 @@ impl Model {
         diagnostics(py, self.inner.diagnostics())
     }
 
+    /// Model with stresses at nodes as a recovery, from the elements of its deck: `nodes` is "surface", "nodes" (all), or a
+    /// sequence of node numbers. The assembled stiffness of the elements has to be K.
+    ///
+    /// Raises InputError.
+    #[pyo3(signature = (nodes: "str | Sequence[int]", *, name=String::from("stress")), text_signature = "($self, nodes, *, name=\"stress\")")]
+    fn with_stresses(&self, py: Python<'_>, nodes: &Bound<'_, PyAny>, name: String) -> PyResult<Self> {
+        let nodes = stress_nodes(nodes)?;
+        let model = Arc::clone(&self.inner);
+        let inner = run(py, move |_| model.with_stresses(name, nodes))?;
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
     /// Computes modes and invariants, like `flexbody.convert`.
+    ///
+    /// `geometric_stiffness` names loads whose stress stiffness is computed from the elements of the deck, separated by
+    /// commas: "spin", "interfaces", "loads"; the assembled stiffness of the elements has to be K.
     ///
     /// With a `scene` (a `Scene`, the path of a scene file, or a list of load cases) the body has only the terms and
     /// modes that the scene needs; `Body.terms` gives the reasons. A selection that does not hold, or cannot be judged, is
@@ -335,10 +379,11 @@ impl Model {
             accuracy: "_types.Accuracy" = None,
             frame: "_types.Frame" = None,
             comparators=true,
+            geometric_stiffness: "_types.StressLoads" = None,
             scene: "_Cases | None" = None,
             allow_unjudged=false,
         ),
-        text_signature = "($self, *, modes=None, max_frequency=None, basis=\"free\", accuracy=\"standard\", frame=\"com\", comparators=True, scene=None, allow_unjudged=False)"
+        text_signature = "($self, *, modes=None, max_frequency=None, basis=\"free\", accuracy=\"standard\", frame=\"com\", comparators=True, geometric_stiffness=\"none\", scene=None, allow_unjudged=False)"
     )]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn convert(
@@ -350,10 +395,14 @@ impl Model {
         accuracy: Argument<'_, '_>,
         frame: Argument<'_, '_>,
         comparators: bool,
+        geometric_stiffness: Argument<'_, '_>,
         scene: Argument<'_, '_>,
         allow_unjudged: bool,
     ) -> PyResult<Body> {
         let mut options = convert_options(modes, max_frequency, [basis, accuracy, frame], comparators)?;
+        if let Some(given) = geometric_stiffness {
+            options = options.geometric_stiffness(stress_loads(given)?);
+        }
         if allow_unjudged {
             if scene.is_none() {
                 return Err(value_error(py, "`allow_unjudged` is given without a `scene`"));

@@ -43,7 +43,7 @@ pub use flexbody_body::convert::StressLoads;
 pub use flexbody_body::invariants::{BodyFrame, FrameChoice};
 pub use flexbody_eigen::Accuracy;
 pub use flexbody_input::{Recipe, Step as RecipeStep};
-pub use flexbody_model::{Coupling, Quantity, RecoveryRow};
+pub use flexbody_model::{Coupling, Quantity, RecoveryRow, StressNodes};
 pub use flexbody_report::{ComparisonFormat, ComparisonRow, ModePair, Tolerances};
 #[cfg(feature = "hdf5")]
 pub use flexbody_study::trade::ReferenceChoice;

@@ -11,8 +11,8 @@ use flexbody_input::{
 };
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
-    CheckedModel, Coupling, Damping, DampingBand, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel,
-    Reference, SurfaceMesh,
+    CheckedModel, Coupling, Damping, DampingBand, DofLabel, FeModel, NodalStress, NodeSet, Nodes, RawMatrix,
+    RawModel, Reference, StressNodes, SurfaceMesh,
 };
 use std::path::{Path, PathBuf};
 
@@ -102,7 +102,8 @@ impl Model {
     /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all errors of a stage
     /// together.
     pub fn read(manifest: impl AsRef<Path>) -> Result<Self> {
-        let files = read_manifest(manifest)?;
+        let mut files = read_manifest(manifest)?;
+        files.describe_elements = true;
         Self::checked(read_model(&files)?, files.residual_vectors)
     }
 
@@ -133,7 +134,21 @@ impl Model {
         let path = path.as_ref();
         let mut files = ModelFiles::from_job(path, program.map(str::to_owned), interfaces, units.as_deref())?;
         files.damping = damping.map(parse_damping).transpose()?;
+        files.describe_elements = true;
         Self::checked(read_model(&files)?, Vec::new())
+    }
+
+    /// Returns the model with stresses at nodes as a recovery `name`: means over the elements of one material around each
+    /// node, from the elements of its deck, whose assembled stiffness has to be K.
+    ///
+    /// # Errors
+    /// FB462 if the elements are not known or K does not prove them; FB323 for nodes of no element; FB201 for a name that is
+    /// given twice.
+    pub fn with_stresses(&self, name: impl Into<String>, nodes: StressNodes) -> Result<Self> {
+        let mut model = self.clone();
+        let asked = NodalStress { name: name.into(), nodes, path: PathBuf::new() };
+        model.checked.add_nodal_stresses(std::slice::from_ref(&asked))?;
+        Ok(model)
     }
 
     /// Returns the names of the FE programs whose output [`Model::read_job`] reads.
@@ -154,7 +169,7 @@ impl Model {
         } else {
             ModelFiles::from_job(path, None, Vec::new(), None)?
         };
-        files.describe_elements |= !StressLoads::recorded(&body.0.source().settings).is_empty();
+        files.describe_elements = true;
         let CheckedModel { model, diagnostics, .. } = model_of(&body.0, read_model(&files)?)?;
         Ok(Self { checked: model, residual_vectors: files.residual_vectors, diagnostics })
     }

@@ -234,6 +234,7 @@ def convert(
     accuracy: _types.Accuracy = "standard",
     frame: _types.Frame = "com",
     comparators: bool = True,
+    geometric_stiffness: _types.StressLoads = "none",
     scene: Scene | Sequence[Scene] | Mapping[str, Any] | _types.Path | None = None,
     allow_unjudged: bool = False,
     name: str = "model",
@@ -260,6 +261,7 @@ def convert(
     accuracy: _types.Accuracy = "standard",
     frame: _types.Frame = "com",
     comparators: bool = True,
+    geometric_stiffness: _types.StressLoads = "none",
     scene: Scene | Sequence[Scene] | Mapping[str, Any] | _types.Path | None = None,
     allow_unjudged: bool = False,
     program: _types.Program | None = None,
@@ -279,6 +281,7 @@ def convert(
     accuracy: _types.Accuracy = "standard",
     frame: _types.Frame = "com",
     comparators: bool = True,
+    geometric_stiffness: _types.StressLoads = "none",
     scene: Any = None,
     allow_unjudged: bool = False,
     **of_model: Any,
@@ -305,6 +308,10 @@ def convert(
         then rests in every mode).
     comparators
         True to compute the results of lumped masses for comparison.
+    geometric_stiffness
+        Loads whose stress stiffness is computed from the elements of the deck, separated by commas: "spin",
+        "interfaces" (unit forces and moments), "loads" (named loads); or "none". The assembled stiffness of the
+        elements has to be K (FB462).
     scene
         A Scene, a list of load cases, or a scene as `flexbody.Scene` takes it (the path of a file, a text, a
         dict), for a body with the terms and modes alone that it needs.
@@ -334,6 +341,7 @@ def convert(
         accuracy=accuracy,
         frame=frame,
         comparators=comparators,
+        geometric_stiffness=geometric_stiffness,
         scene=scene,
         allow_unjudged=allow_unjudged,
     )

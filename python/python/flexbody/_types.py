@@ -22,6 +22,8 @@ Coupling: TypeAlias = Literal["rigid", "averaging", "free"]
 """Coupling of an interface to its reference point."""
 Reference: TypeAlias = Literal["full", "fine", "nodal"]
 """Reference motion of a trade study."""
+StressLoads: TypeAlias = Union[Literal["none", "spin", "interfaces", "loads", "spin,interfaces"], str]
+"""Loads whose stress stiffness is computed, separated by commas."""
 ResidualLoads: TypeAlias = Literal["interfaces", "centrifugal"]
 """Loads whose static responses join free modes."""
 

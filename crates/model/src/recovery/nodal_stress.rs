@@ -38,7 +38,7 @@ impl FeModel {
     /// # Errors
     /// The errors of [`FeModel::proved_elements`]; [`RecoveryRows`](Code::RecoveryRows) for nodes of no element;
     /// [`ManifestSyntax`](Code::ManifestSyntax) for a name that is given twice.
-    pub(crate) fn add_nodal_stresses(&mut self, asked: &[NodalStress]) -> Result<()> {
+    pub fn add_nodal_stresses(&mut self, asked: &[NodalStress]) -> Result<()> {
         let mut names = self.recoveries().iter().map(|one| one.name.clone()).collect();
         for NodalStress { name, nodes, path } in asked {
             refuse_name(name, &mut names)
