@@ -2,7 +2,7 @@
 
 use crate::Elasticity;
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// Node and direction, 1 to 6, of a degree of freedom.
@@ -99,6 +99,32 @@ pub struct NotDescribed {
     pub nodes: Vec<i64>,
 }
 
+impl DescribedElements {
+    /// Returns the part of the description that touches some nodes: those of one of several bodies. Nodes inside elements, and
+    /// nodes that follow others, belong to the elements and nodes that they are connected to.
+    pub fn among(&self, is_kept: impl Fn(i64) -> bool) -> Self {
+        let touches = |nodes: &[i64]| nodes.iter().any(|node| is_kept(*node));
+        let groups: Vec<ElementGroup> =
+            self.groups.iter().map(|group| group.of(touches)).filter(|group| !group.ids.is_empty()).collect();
+        let of_rows = |rows: &[NodeDirection]| rows.iter().any(|(node, _)| is_kept(*node));
+        let follows = |equation: &&Equation| {
+            let terms = equation.terms.iter().any(|((node, _), _)| is_kept(*node));
+            terms || is_kept(equation.dependent.0) || equation.terms.is_empty()
+        };
+        let is_near = |part: &&NotDescribed| part.nodes.is_empty() || touches(&part.nodes);
+        let members: BTreeSet<i64> = groups.iter().flat_map(|group| group.nodes.iter().copied()).collect();
+        let position = |(id, x): (&i64, &[f64; 3])| members.contains(id).then_some((*id, *x));
+        Self {
+            positions: self.positions.iter().filter_map(position).collect(),
+            groups,
+            direct: self.direct.iter().filter(|spring| of_rows(&spring.rows)).cloned().collect(),
+            equations: self.equations.iter().filter(follows).cloned().collect(),
+            not_described: self.not_described.iter().filter(is_near).cloned().collect(),
+            path: self.path.clone(),
+        }
+    }
+}
+
 impl Axes {
     /// Returns the axes at a position as columns, along the axes of the model; `None` on the axis of a cylinder.
     pub fn at(&self, x: &Vector3<f64>) -> Option<Matrix3<f64>> {
@@ -126,6 +152,17 @@ impl Section {
 }
 
 impl ElementGroup {
+    /// Returns the group with the elements whose nodes pass a test.
+    fn of(&self, is_kept: impl Fn(&[i64]) -> bool) -> Self {
+        let mut kept = Self { ids: Vec::new(), nodes: Vec::new(), internal: Vec::new(), ..self.clone() };
+        for (id, nodes, internal) in self.elements().filter(|(_, nodes, _)| is_kept(nodes)) {
+            kept.ids.push(id);
+            kept.nodes.extend(nodes);
+            kept.internal.extend(internal);
+        }
+        kept
+    }
+
     /// Returns number, nodes and internal nodes of each element.
     pub fn elements(&self) -> impl Iterator<Item = (i64, &[i64], &[i64])> {
         let count = self.ids.len().max(1);

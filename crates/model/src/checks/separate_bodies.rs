@@ -14,8 +14,9 @@ use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_linalg::SymmetricMatrix;
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::convert::Infallible;
+use std::sync::Arc;
 
 impl FeModel {
     /// Checks matrices that hold several bodies, as [`from_raw`](FeModel::from_raw) does for one: each body
@@ -180,6 +181,7 @@ fn body_model(
         .filter(|one| one.matrix.as_csc().nnz() > 0)
         .collect();
     let name = format!("{}-{}", all.description.name, number.number);
+    let own: HashSet<i64> = nodes.ids.iter().copied().collect();
     let data = ModelData {
         description: Description { name, number: Some(number), ..all.description.clone() },
         interfaces,
@@ -187,9 +189,9 @@ fn body_model(
         damping,
         geometric_stiffness,
         recoveries: recoveries_of_body(&all.recoveries, kept, &nodes),
-        nodal_stresses: all.nodal_stresses.clone(),
+        nodal_stresses: all.nodal_stresses.iter().filter_map(|asked| asked.among(&own)).collect(),
         named_loads: loads_of_body(&all.named_loads, kept),
-        elements: all.elements.clone(),
+        elements: all.elements.as_ref().map(|elements| Arc::new(elements.among(|node| own.contains(&node)))),
         sources: all.sources.clone(),
     };
     Assembled {

@@ -5,6 +5,7 @@ use crate::wording::name_some;
 use crate::{FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 /// Components of a stress, in the order of its rows.
@@ -30,6 +31,15 @@ pub enum StressNodes {
     Surface,
     /// Nodes by their numbers.
     These(Vec<i64>),
+}
+
+impl NodalStress {
+    /// Returns the stresses at those of its nodes that belong to a body; `None` if it has none of them.
+    pub(crate) fn among(&self, body: &HashSet<i64>) -> Option<Self> {
+        let StressNodes::These(nodes) = &self.nodes else { return Some(self.clone()) };
+        let own: Vec<i64> = nodes.iter().copied().filter(|node| body.contains(node)).collect();
+        (!own.is_empty()).then(|| Self { nodes: StressNodes::These(own), ..self.clone() })
+    }
 }
 
 impl FeModel {
