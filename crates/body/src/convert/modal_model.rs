@@ -3,6 +3,7 @@
 
 use super::body_modes::{self, reduced, reduced_in_twice_the_precision};
 use super::soft_rotations::effect_of_soft_rotations;
+use super::stress_estimate::estimated_stiffness;
 use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::basis::{BasisChoice, ModalBasis, Task};
 use crate::flex_body::{Guarantee, Interface, RotatedStiffness, TermDecision, TermGroup, TermGroups};
@@ -34,6 +35,8 @@ pub struct ModalModel<'m> {
     /// Psi' K_geo Psi of unit loads along the body axes.
     pub(super) geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     pub(super) rotated_stiffness: Vec<RotatedStiffness>,
+    /// Estimate of the geometric stiffness of spin that the model does not have.
+    pub(super) estimated_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     pub(super) inertia_stiffness: Option<InertiaStiffness>,
     pub(super) nodes: Nodes,
     pub(super) interfaces: Vec<Interface>,
@@ -82,6 +85,13 @@ impl<'m> ModalModel<'m> {
         };
         let (geometric_stiffness, rotated_stiffness) =
             modal_geometric_stiffness(model, &modes.vectors, &frame, &shift)?;
+        let estimated_stiffness = match given_frame {
+            Some(_) => Vec::new(),
+            None => {
+                let first = found.solution.eigenvalues.first().copied().unwrap_or(1.0);
+                estimated_stiffness(model, &modes.vectors, first, &frame, &context.without_counter())?
+            }
+        };
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let all = model.nodes_of_body();
         let nodes = Nodes { ids: all.ids.clone(), positions: frame.to_body(&all.positions) };
@@ -97,6 +107,7 @@ impl<'m> ModalModel<'m> {
             modal_stiffness,
             geometric_stiffness,
             rotated_stiffness,
+            estimated_stiffness,
             inertia_stiffness,
             nodes,
             interfaces,

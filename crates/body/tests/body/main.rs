@@ -41,5 +41,6 @@ mod soft_rotations;
 mod spinning_shaft;
 mod stated_ratios;
 mod store_body;
+mod stress_estimate;
 mod symmetry;
 mod work_counters;

@@ -322,7 +322,9 @@ impl<'b> EquationParts<'b> {
     }
 
     fn geometric(&self, kind: LoadKind) -> Option<impl Fn(usize, usize, usize) -> f64 + use<'b>> {
-        let which = if self.terms.geometric_stiffness { Stiffening::All } else { Stiffening::OfInertia };
+        // The stress of the spin stiffens as much as W2 softens: without W2 both are left out.
+        let is_used = self.terms.geometric_stiffness && (kind != LoadKind::Spin || self.terms.w2);
+        let which = if is_used { Stiffening::All } else { Stiffening::OfInertia };
         stiffness_under(self.body, &kind, which)
     }
 
