@@ -1,6 +1,6 @@
 //! Stress stiffness of spin that a body does not have, as an estimate: it judges results, and never enters a motion.
 
-use super::{FlexBody, GeometricStiffness, LoadKind, UnitLoad};
+use super::{FlexBody, GeometricStiffness, LoadKind, SOFTENING, UnitLoad};
 use crate::invariants::relative_norm;
 use faer::{Mat, Scale};
 use flexbody_base::error::Result;
@@ -78,5 +78,29 @@ impl FlexBody {
             sum + &one.matrix * Scale(omega[k] * omega[l])
         });
         relative_norm(sum.as_ref(), self.invariants().modal_stiffness().as_ref())
+    }
+
+    /// Returns the spin rate about axis `axis` of the model at which the missing stiffness changes 1 % of the stiffness of
+    /// some motion. Returns `None` if no motion changes. Unit: 1/time.
+    ///
+    /// # Panics
+    /// When `axis` is not below 3.
+    pub fn missing_rate(&self, axis: usize) -> Option<f64> {
+        let omega_body = self.frame().axes.transpose() * Vector3::ith(axis, 1.0);
+        let part = self.missing_part(&omega_body, true)?;
+        (part > 0.0).then(|| (SOFTENING / part).sqrt())
+    }
+
+    /// Returns the largest part of the stiffness of any motion that the missing stiffness changes at a spin of 1 about any of
+    /// thirteen axes: those of the body, and the diagonals between them. Returns `None` if nothing is missing.
+    pub fn largest_missing_part(&self) -> Option<f64> {
+        let components = [-1.0, 0.0, 1.0];
+        let triples = components.iter().flat_map(|x| components.iter().map(move |y| (*x, *y)));
+        let all = triples.flat_map(|(x, y)| components.iter().map(move |z| Vector3::new(x, y, *z)));
+        // One of each two opposite directions; a plane body turns about its normal.
+        let is_first = |axis: &Vector3<f64>| axis.iter().find(|c| **c != 0.0).is_some_and(|c| *c > 0.0);
+        let turns = |axis: &Vector3<f64>| self.dimension() == 3 || (axis.x == 0.0 && axis.y == 0.0);
+        let parts = all.filter(is_first).filter(turns);
+        parts.filter_map(|axis| self.missing_part(&axis.normalize(), true)).reduce(f64::max)
     }
 }

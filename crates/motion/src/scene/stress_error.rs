@@ -58,6 +58,7 @@ impl StressError {
         let stressed = body.with_missing_stiffness(scene.run.terms.geometric_stiffness)?;
         let mut scene = scene.clone();
         scene.run.terms.geometric_stiffness = true;
+        scene.run.terms.stress_without_w2 = true;
         scene.run.scheme = own.scheme;
         let all: Vec<usize> = (0..body.n_modes()).collect();
         let errors = match trace_at(&stressed, &scene, &own.time, &context.without_listener()) {
