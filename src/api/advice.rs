@@ -44,6 +44,7 @@ impl Advice<'_> {
 
     /// Returns the report of `flexbody advise` on the body in the file `path`, which its command names.
     pub fn report(&self, path: &str, format: ReportFormat) -> String {
-        AdviceFacts::new(&self.inner, &self.body.0, path, &RunData::default()).render(format.inner())
+        let data = RunData { diagnostics: self.inner.warning().into_iter().collect(), ..RunData::default() };
+        AdviceFacts::new(&self.inner, &self.body.0, path, &data).render(format.inner())
     }
 }

@@ -23,6 +23,7 @@ pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
         limit: arguments.limit,
     };
     let advice = advise(&body, ranges)?;
+    run.note(advice.warning());
     let data = run.data()?;
     let facts = AdviceFacts::new(&advice, &body, &arguments.body.display().to_string(), &data);
     run.end(None, |format| facts.render(format), true)

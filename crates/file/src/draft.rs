@@ -102,6 +102,7 @@ impl Draft {
                 compliance: None,
             }),
             Per::UnitLoad => self.body.geometric_stiffness.push(load()),
+            Per::EstimatedLoad => self.body.estimated_stiffness.push(load()),
             Per::InertiaLoad => self.inertia().stiffness.push(load()),
             Per::RotatedLoad => self.body.rotated_stiffness.push(RotatedStiffness {
                 load: unit_load(),
@@ -109,7 +110,7 @@ impl Draft {
                 rotation: Mat::new(),
             }),
         }
-        let known = !matches!(per, Per::UnitLoad | Per::InertiaLoad | Per::RotatedLoad)
+        let known = !matches!(per, Per::UnitLoad | Per::EstimatedLoad | Per::InertiaLoad | Per::RotatedLoad)
             || UnitLoad::from_label(name).is_some();
         if known { Ok(()) } else { Err("expected a kind of load with its axis or name".to_owned()) }
     }
@@ -252,6 +253,7 @@ impl Draft {
     pub(super) fn load(&mut self) -> &mut GeometricStiffness<Mat<f64>> {
         let at = self.at;
         match self.per {
+            Per::EstimatedLoad => &mut self.body.estimated_stiffness[at],
             Per::InertiaLoad => &mut self.inertia().stiffness[at],
             _ => &mut self.body.geometric_stiffness[at],
         }
@@ -283,6 +285,7 @@ impl Draft {
             let order: Vec<UnitLoad> = InertiaStiffness::loads(3).collect();
             inertia.stiffness.sort_by_key(|one| order.iter().position(|load| *load == one.load));
         }
+        self.body.estimated_stiffness.sort_by_key(|one| one.load.component);
         if self.triangles.is_some() || self.edges.is_some() {
             let triangles = self.triangles.unwrap_or_default().as_chunks().0.to_vec();
             let edges = self.edges.unwrap_or_default().as_chunks().0.to_vec();
@@ -405,6 +408,7 @@ fn empty_body(units: UnitSystem, storage: Storage, invariants: Invariants) -> Pa
         invariants,
         geometric_stiffness: Vec::new(),
         rotated_stiffness: Vec::new(),
+        estimated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped: Vec::new(),
         certificate: Certificate {

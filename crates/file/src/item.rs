@@ -386,6 +386,10 @@ impl SchemaGroup {
                 let one = |l: &'a NamedLoad| (Some(l.name.clone()), View { named_load: Some(l), ..view });
                 body.named_loads.iter().map(one).collect()
             }
+            Per::EstimatedLoad => {
+                let view = |g| View { geometric_stiffness: Some(g), ..view };
+                body.estimated_stiffness.iter().map(|g| (Some(g.load.label()), view(g))).collect()
+            }
             Per::InertiaLoad => {
                 let view = |g| View { geometric_stiffness: Some(g), ..view };
                 let all = body.inertia_stiffness.iter().flat_map(|own| &own.stiffness);

@@ -8,6 +8,7 @@ pub(super) enum Per {
     Interface,
     UnitLoad,
     RotatedLoad,
+    EstimatedLoad,
     InertiaLoad,
     Recovery,
     NamedLoad,

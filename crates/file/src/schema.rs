@@ -26,7 +26,7 @@ use flexbody_body::flex_body::{MassStructure, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
 use interfaces::{COORDINATES, INTERFACES};
 use invariants::{
-    COMPARISON, DAMPING, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED, ROTATED_STIFFNESS,
+    COMPARISON, DAMPING, ESTIMATED_STIFFNESS, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED, ROTATED_STIFFNESS,
 };
 use nalgebra::{Matrix3, Vector3};
 use named_load::NAMED_LOAD;
@@ -530,6 +530,12 @@ pub(super) const TABLE: &[SchemaGroup] = &[
         per: Per::RotatedLoad,
         description: "Geometric stiffness of unit rotations R of the body about the axes of the frame, for every load of `/geometric_stiffness`: what modes lose or gain where a rigid motion is taken from them, as that of a carrier (theory section 7). Translations cause no force. Absent: not known.",
         items: &[ROTATED_STIFFNESS],
+    },
+    SchemaGroup {
+        path: "/estimated_stiffness/<load>",
+        per: Per::EstimatedLoad,
+        description: "Estimate of the geometric stiffness of spin about the centre of mass for the components that `/geometric_stiffness` does not hold: forces of a truss between the nodes that K couples, under the same load (theory section 7). It shows what a result without geometric stiffness is worth; a solver must not add it. Absent: nothing is missing, or not known.",
+        items: &[ESTIMATED_STIFFNESS],
     },
     SchemaGroup {
         path: "/inertia_stiffness/<load>",

@@ -7,7 +7,7 @@ use flexbody_body::flex_body::Parts;
 pub(super) const MAJOR: i64 = 1;
 /// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds
 /// ([`least_minor`]).
-pub(super) const MINOR: i64 = 12;
+pub(super) const MINOR: i64 = 13;
 /// Minor version from which on every file has digests.
 pub(super) const DIGESTS_SINCE: i64 = 4;
 /// Minor version since which a group without members is left out. Files always have groups of earlier versions, so that

@@ -291,6 +291,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         },
         geometric_stiffness: geometric_stiffness(&mut r, nf, interfaces),
         rotated_stiffness: Vec::new(),
+        estimated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped,
         certificate: Certificate {
@@ -356,6 +357,11 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
             rotation: r.matrix(3, 3),
         };
         parts.rotated_stiffness = parts.geometric_stiffness.iter().map(rotated).collect();
+        let estimated = |component| GeometricStiffness {
+            load: UnitLoad { kind: LoadKind::Spin, component },
+            matrix: r.matrix(nf, nf),
+        };
+        parts.estimated_stiffness = [0, 2, 5].map(estimated).into();
     }
     parts
 }
@@ -393,6 +399,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     }
     matrix(&mut bits, &p.modes.shape);
     p.geometric_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
+    p.estimated_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
     for one in &p.rotated_stiffness {
         matrix(&mut bits, &one.modes);
         matrix(&mut bits, &one.rotation);

@@ -128,6 +128,7 @@ pub fn made_of(
         invariants,
         geometric_stiffness: Vec::new(),
         rotated_stiffness: Vec::new(),
+        estimated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped: Vec::new(),
         certificate: Certificate {

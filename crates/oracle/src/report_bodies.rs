@@ -107,6 +107,7 @@ pub fn engine_mount() -> FlexBody {
         invariants: invariants(1.25, 1.0),
         geometric_stiffness: vec![],
         rotated_stiffness: vec![],
+        estimated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped: vec![lumped("row-sum", 312, 1.0), lumped("diagonal-scaling", 0, 0.125)],
         certificate: Certificate {
@@ -270,6 +271,7 @@ pub fn condensed(
         invariants,
         geometric_stiffness: vec![],
         rotated_stiffness: vec![],
+        estimated_stiffness: Vec::new(),
         inertia_stiffness: None,
         lumped: vec![],
         certificate: Certificate {

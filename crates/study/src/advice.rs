@@ -6,6 +6,7 @@ use crate::attached_mass::Carried;
 use crate::selection::{Significance, Situation, significances};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_linalg::ties::first_largest;
 use flexbody_motion::dynamics::Terms;
@@ -82,9 +83,24 @@ pub struct Advice {
     pub guidelines: Vec<GuidelineAdvice>,
     /// Groups of the kinetic energy with a term above the limit.
     pub groups: TermGroups,
+    /// Largest part of the stiffness of a motion that the stress of the spin changes, by the estimate of the stiffness that
+    /// the body does not have; zero if nothing is missing.
+    pub missing_stress: f64,
 }
 
 impl Advice {
+    /// Returns a warning if the missing stress stiffness changes more of a stiffness than the limit.
+    pub fn warning(&self) -> Option<Diagnostic> {
+        (self.missing_stress > self.ranges.limit).then(|| {
+            let message = format!(
+                "the body has no geometric stiffness of spin: a spin of {} Hz changes up to {} % of the stiffness of a motion by its stress (estimate), and the sizes of the terms leave that out",
+                significant(self.ranges.spin_hz, 4),
+                significant(100.0 * self.missing_stress, 2)
+            );
+            Diagnostic::new(Code::SpinSoftens, message)
+        })
+    }
+
     /// Returns the first guideline that qualifies. The last one always does.
     pub fn guideline(&self) -> &GuidelineAdvice {
         let first = self.guidelines.iter().find(|one| one.qualifies());
@@ -146,6 +162,7 @@ pub fn advise(body: &FlexBody, ranges: Ranges) -> Result<Advice> {
             .filter(|group| is_needed(group))
             .fold(TermGroups::NONE, |all, one| all.with(*one)),
         guidelines: guidelines.to_vec(),
+        missing_stress: body.largest_missing_part().map_or(0.0, |part| part * spin * spin),
         terms,
         ranges,
     })

@@ -370,8 +370,8 @@ codes! {
         "The integration found no step that meets its tolerances, or the motion grew beyond what the model describes.";
     LinearRangeLeft = "FB541", Warning, Done, "deflections beyond the range of linear elasticity", "trust the result as a trend only; a body of several flexible parts carries larger deflections",
         "A node is deflected by a large part of the size of the body, and modes describe small deformations only.";
-    SpinSoftens = "FB542", Warning, Done, "body without geometric stiffness is too soft at this spin", "convert the model with [[geometric_stiffness]] for spin, and do not switch it off in [run]",
-        "At the spin of the scene the inertia forces remove a noticeable part of the stiffness, and the body has no geometric stiffness that a real one gains.";
+    SpinSoftens = "FB542", Warning, Done, "the stress of the spin changes the stiffness, and the body does not have it", "give the geometric stiffness of spin (convert --geometric-stiffness spin, or [[geometric_stiffness]]: docs/how_to/geometric_stiffness.md), and do not switch it off in [run]",
+        "A second run with an estimate of the stress stiffness of the spin differs from the first by more than a third of the tolerances: its errors relative to a body without it say nothing about the part.";
     PhaseDrifts = "FB543", Warning, Done, "errors grow with time although amplitudes are bounded", "check a run of the longest duration that the model is meant for: phases drift apart with angular velocity times duration",
         "A small error of the angular velocity adds up to a growing error of the angle.";
     ResonanceDropped = "FB544", Warning, Done, "dropped mode is near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show",

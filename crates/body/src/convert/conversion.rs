@@ -115,6 +115,7 @@ impl ModalModel<'_> {
             invariants: condensed.invariants.clone(),
             geometric_stiffness: self.geometric_stiffness.clone(),
             rotated_stiffness: self.rotated_stiffness.clone(),
+            estimated_stiffness: self.estimated_stiffness.clone(),
             inertia_stiffness: self.inertia_stiffness.clone(),
             lumped,
             certificate: self.certificate(condensed.guarantee.clone()),

@@ -20,6 +20,7 @@ mod recovery;
 mod settings;
 mod shapes;
 mod soft_rotations;
+mod stress_estimate;
 mod stress_stiffness;
 
 pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};

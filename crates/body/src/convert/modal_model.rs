@@ -3,6 +3,7 @@
 
 use super::body_modes::{self, reduced, reduced_in_twice_the_precision};
 use super::soft_rotations::effect_of_soft_rotations;
+use super::stress_estimate::estimated_stiffness;
 use super::stress_stiffness::{StressedModes, stress_stiffness};
 use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
 use crate::basis::{BasisChoice, ModalBasis, Task};
@@ -16,7 +17,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_eigen::Accuracy;
 use flexbody_linalg::context::{Context, Work, WorkCounter};
-use flexbody_model::{FeModel, GeometricStiffness, Nodes};
+use flexbody_model::{FeModel, GeometricStiffness, LoadKind, Nodes};
 use nalgebra::Vector3;
 
 /// Checked model and its modes in body axes; the mass is not condensed yet.
@@ -35,6 +36,8 @@ pub struct ModalModel<'m> {
     /// Psi' K_geo Psi of unit loads along the body axes.
     pub(super) geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     pub(super) rotated_stiffness: Vec<RotatedStiffness>,
+    /// Estimate of the geometric stiffness of spin that the model does not have.
+    pub(super) estimated_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     pub(super) inertia_stiffness: Option<InertiaStiffness>,
     pub(super) nodes: Nodes,
     pub(super) interfaces: Vec<Interface>,
@@ -81,15 +84,22 @@ impl<'m> ModalModel<'m> {
             Some(frame) => frame.origin - mass_properties.centre_of_mass,
             None => Vector3::zeros(),
         };
+        let first = found.solution.eigenvalues.first().copied().unwrap_or(1.0);
         let of = StressedModes {
             modes: &modes.vectors,
             modal_stiffness: &modal_stiffness,
-            lowest: found.solution.eigenvalues[0],
+            lowest: first,
             frame: &frame,
         };
         let computed = stress_stiffness(model, settings.stress_stiffness, &of, context)?;
         let (geometric_stiffness, rotated_stiffness) =
             modal_geometric_stiffness(model, &modes.vectors, computed, &frame, &shift)?;
+        let has_spin = geometric_stiffness.iter().any(|one| one.load.kind == LoadKind::Spin);
+        let estimated_stiffness = if given_frame.is_some() || has_spin {
+            Vec::new()
+        } else {
+            estimated_stiffness(model, &modes.vectors, first, &frame, &context.without_counter())?
+        };
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let all = model.nodes_of_body();
         let nodes = Nodes { ids: all.ids.clone(), positions: frame.to_body(&all.positions) };
@@ -105,6 +115,7 @@ impl<'m> ModalModel<'m> {
             modal_stiffness,
             geometric_stiffness,
             rotated_stiffness,
+            estimated_stiffness,
             inertia_stiffness,
             nodes,
             interfaces,

@@ -82,6 +82,8 @@ impl FlexBody {
         parts.named_loads = parts.named_loads.iter().map(|load| load.without_rigid_motion(&motion)).collect();
         parts.recoveries = parts.recoveries.iter().map(|one| one.without_rigid_motion(&motion)).collect();
         (parts.geometric_stiffness, parts.rotated_stiffness) = (geometric_stiffness, rotated_stiffness);
+        // The estimate is that of the free body, without the stress of the reaction.
+        parts.estimated_stiffness = Vec::new();
         // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
             (Some(inertia), Some(rotation)) => {

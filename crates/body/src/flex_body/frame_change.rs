@@ -133,6 +133,8 @@ impl FlexBody {
             Some(all) => split(transformed(all, &change.beside_rotations())),
             None => (parts.geometric_stiffness.iter().map(stiffness).collect(), Vec::new()),
         };
+        // The estimate of modes with rigid motion is not known.
+        parts.estimated_stiffness = Vec::new();
         parts.lumped =
             parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         // Rows that rigid motion changes are known only relative to the former frame.

@@ -9,6 +9,7 @@ mod held_modes;
 mod held_response;
 mod identities;
 mod interface;
+mod missing_stiffness;
 mod modal_change;
 mod model_axes;
 mod motion_columns;

@@ -73,6 +73,8 @@ impl FlexBody {
             }
             None => (self.geometric_stiffness_in(&origin, &to_body), Vec::new()),
         };
+        // The estimate is about the centre of mass, so that it does not depend on the origin.
+        parts.estimated_stiffness = along(self.estimated_stiffness(), &to_body);
         parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
         parts.named_loads = self.named_loads_in(&origin, &to_body);
         parts.recoveries = parts.recoveries.iter().map(|one| one.in_axes(&to_body)).collect();

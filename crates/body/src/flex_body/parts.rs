@@ -189,6 +189,10 @@ pub struct Parts {
     /// versions before 1.10, files of other programs); a body whose carrier moves in its modes then loses its
     /// geometric stiffness while it is carried.
     pub rotated_stiffness: Vec<RotatedStiffness>,
+    /// Estimate of Psi' K_geo Psi for the components of spin, about the centre of mass and along body axes, that the model gives
+    /// no geometric stiffness for. It judges results and never enters a motion or an export. Empty if nothing is missing
+    /// or no estimate is known (files of format versions before 1.13, files of other programs, frames on an interface).
+    pub estimated_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     /// Stiffness of inertia of nodes whose rotations carry mass; `None` if no rotation carries mass, or if
     /// the stiffness is unknown (files of format versions before 1.6, files of other programs).
     pub inertia_stiffness: Option<InertiaStiffness>,

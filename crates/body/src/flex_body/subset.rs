@@ -68,6 +68,7 @@ impl FlexBody {
             modes: parts.modes.some(modes),
             geometric_stiffness: parts.geometric_stiffness.iter().map(stiffness).collect(),
             rotated_stiffness: parts.rotated_stiffness.iter().map(rotated).collect(),
+            estimated_stiffness: parts.estimated_stiffness.iter().map(stiffness).collect(),
             inertia_stiffness: parts.inertia_stiffness.as_ref().map(|inertia| InertiaStiffness {
                 moments: inertia.moments.clone(),
                 stiffness: inertia.stiffness.iter().map(stiffness).collect(),

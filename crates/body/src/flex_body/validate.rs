@@ -35,6 +35,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     }
     check.structure(parts);
     check.geometric_stiffness(parts, nf);
+    check.estimated_stiffness(parts, nf);
     check.rotated_stiffness(parts, nf);
     check.inertia_stiffness(parts, n, nf);
     check.lumped(parts, nf);
@@ -225,6 +226,18 @@ impl Problems {
             } else if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
                 let dimension = parts.dimension;
                 self.add(format!("geometric stiffness `{label}` of a body of dimension {dimension}"));
+            }
+        }
+    }
+
+    fn estimated_stiffness(&mut self, parts: &Parts, nf: usize) {
+        let labels: Vec<String> = parts.estimated_stiffness.iter().map(|one| one.load.label()).collect();
+        self.names("estimated stiffness", labels.iter());
+        for (one, label) in parts.estimated_stiffness.iter().zip(&labels) {
+            self.matrix(&format!("estimated_stiffness `{label}`"), &one.matrix, nf, nf);
+            let is_spin = one.load.kind == LoadKind::Spin;
+            if !is_spin || !LoadKind::Spin.of_dimension(parts.dimension).contains(&one.load.component) {
+                self.add(format!("`estimated_stiffness` has `{label}`, which is no spin of the body"));
             }
         }
     }

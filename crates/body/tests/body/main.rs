@@ -41,6 +41,7 @@ mod soft_rotations;
 mod spinning_shaft;
 mod stated_ratios;
 mod store_body;
+mod stress_estimate;
 mod stress_stiffness;
 mod symmetry;
 mod work_counters;

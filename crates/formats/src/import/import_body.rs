@@ -230,6 +230,7 @@ fn parts(
         invariants: coordinates.invariants,
         geometric_stiffness: coordinates.geometric_stiffness,
         rotated_stiffness: Vec::new(),
+        estimated_stiffness: Vec::new(),
         inertia_stiffness: None,
     }
 }

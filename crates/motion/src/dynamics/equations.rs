@@ -322,7 +322,11 @@ impl<'b> EquationParts<'b> {
     }
 
     fn geometric(&self, kind: LoadKind) -> Option<impl Fn(usize, usize, usize) -> f64 + use<'b>> {
-        let which = if self.terms.geometric_stiffness { Stiffening::All } else { Stiffening::OfInertia };
+        let is_used = match kind {
+            LoadKind::Spin => self.terms.stiffens_by_spin(),
+            _ => self.terms.geometric_stiffness,
+        };
+        let which = if is_used { Stiffening::All } else { Stiffening::OfInertia };
         stiffness_under(self.body, &kind, which)
     }
 
@@ -377,15 +381,24 @@ pub struct Terms {
     /// W3: coupling of rotation and modes through q, and the Coriolis force among modes.
     pub w3: bool,
     /// Geometric stiffness for the motion of the frame and for forces at interfaces (theory 7.4), if the
-    /// body has it. With W2 the stiffness for spin has no additional cost.
+    /// body has it. The stress of the spin stiffens as W2 softens, so that its stiffness acts with W2 only.
     pub geometric_stiffness: bool,
+    /// True if the geometric stiffness of spin acts without W2 too, for a comparison of motions with and without it.
+    pub stress_without_w2: bool,
 }
 
 impl Terms {
     /// All terms that the body has: the exact equations.
-    pub const ALL: Self = Self { w1: true, w2: true, w3: true, geometric_stiffness: true };
+    pub const ALL: Self =
+        Self { w1: true, w2: true, w3: true, geometric_stiffness: true, stress_without_w2: false };
     /// No term that depends on the deformation except the first moment c + C1 q.
-    pub const NONE: Self = Self { w1: false, w2: false, w3: false, geometric_stiffness: false };
+    pub const NONE: Self =
+        Self { w1: false, w2: false, w3: false, geometric_stiffness: false, stress_without_w2: false };
+
+    /// Returns true if the geometric stiffness of spin acts.
+    pub fn stiffens_by_spin(self) -> bool {
+        self.geometric_stiffness && (self.w2 || self.stress_without_w2)
+    }
 
     /// Returns the terms that a body with `groups` can provide.
     pub fn held(self, groups: TermGroups) -> Self {

@@ -27,6 +27,7 @@ mod row_extremes;
 mod row_states;
 mod samples;
 mod simulate;
+mod stress_error;
 mod surroundings;
 mod trace;
 
@@ -59,5 +60,6 @@ pub use row_extremes::{EnvelopeSearch, ExtremeSearch, PointEnvelope, RowExtreme,
 pub use row_states::{RowLayout, RowMap, RowStates};
 pub use samples::{Interpolation, Sample, Samples, Sizes};
 pub use simulate::{Path, Recording, Resolution, Setting, simulate, simulate_with_envelope};
+pub use stress_error::StressError;
 pub use surroundings::{Driving, body_point, points_of};
 pub use trace::{MotionHistory, Trace, trace, trace_at};

@@ -6,6 +6,7 @@ use super::instants::unsettled_rate;
 use super::interface_stresses::stresses_at_rigid_interfaces;
 use super::recovered::{LoadedHistory, RecoveredMotion};
 use super::simulate::{Recording, simulate, simulate_with_envelope};
+use super::stress_error::StressError;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -57,6 +58,8 @@ impl SimulationRequest {
         let simulate = if self.needs_envelope { simulate_with_envelope } else { simulate };
         let (recording, mut diagnostics) = simulate(body, scene, context)?;
         diagnostics.extend(unsettled_rate(body, scene, &recording, context)?);
+        let missing_stress = StressError::of_run(body, scene, &recording.extremes, context)?;
+        diagnostics.extend(missing_stress.and_then(|error| error.warning(body)));
         if self.needs_recoveries() && recording.recovered.is_none() {
             let message = "no recovery of the body is left in this scene, so there are no rows to write";
             return Err(Diagnostic::new(Code::RecoveryUnknown, message).into());

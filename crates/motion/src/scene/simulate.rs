@@ -11,9 +11,8 @@ use crate::integration::{Failure, ObserverEvent, Work};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
-use flexbody_body::flex_body::{FlexBody, MotionLoad, Recovery, SOFTENING, axis_in_words};
+use flexbody_body::flex_body::{FlexBody, MotionLoad, Recovery};
 use flexbody_linalg::context::Context;
-use flexbody_linalg::ties::first_largest;
 use flexbody_model::LoadKind;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -110,7 +109,7 @@ fn simulate_recording(
         framed.found,
         left_out,
         unseen.unwrap_or_default(),
-        remarks(body, scene, &recording.extremes),
+        remarks(body, &recording.extremes),
         at_interfaces,
     ]
     .concat();
@@ -217,7 +216,7 @@ fn refuse_too_much(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Res
 }
 
 /// Returns warnings about a motion with these extremes that leaves the range of validity of the model.
-pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Vec<Diagnostic> {
+pub(super) fn remarks(body: &FlexBody, extremes: &Extremes) -> Vec<Diagnostic> {
     let (mut found, unit) = (Vec::new(), body.units().time.name());
     let deflection = extremes.deflection;
     if deflection.value > LINEAR_RANGE {
@@ -228,37 +227,7 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
         );
         found.push(Diagnostic::new(Code::LinearRangeLeft, message));
     }
-    let stiffened = scene.run.terms.geometric_stiffness
-        && body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
-    if scene.run.terms.w2 && !stiffened {
-        found.extend(softening(body, extremes));
-    }
     found
-}
-
-/// Returns a warning if spin takes more than one hundredth of the stiffness of some motion.
-fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
-    if extremes.spins.is_empty() {
-        return None;
-    }
-    // A bound for any axis decides most cases without a search.
-    let (_, worst) = body.worst_spin()?;
-    if worst * extremes.spin.powi(2) <= SOFTENING {
-        return None;
-    }
-    // The exact softening about each of the axes that occurred.
-    let part = |omega: &Vector3<f64>| Some((body.softening(omega)?, *omega));
-    let (part, omega) = first_largest(extremes.spins.iter().filter_map(part), |one| one.0)?;
-    (part > SOFTENING).then(|| {
-        let message = format!(
-            "the spin about {} reaches {} rad/{}: without geometric stiffness it removes {:.2} % of the stiffness of some motion",
-            axis_in_words(&omega),
-            rounded(omega.norm()),
-            body.units().time.name(),
-            100.0 * part
-        );
-        Diagnostic::new(Code::SpinSoftens, message)
-    })
 }
 
 /// Returns the value rounded to four digits, for messages.

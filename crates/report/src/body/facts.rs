@@ -2,7 +2,7 @@
 
 use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
-use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz};
+use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz, stress_hz};
 use super::held::HeldFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::named_loads::NamedLoadFacts;
@@ -20,7 +20,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major version breaks readers, a newer minor version only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 12;
+const MINOR: u32 = 13;
 
 /// All facts of a report. The JSON form follows the schema `schemas/report.schema.json`.
 ///
@@ -245,6 +245,9 @@ pub(super) struct ModeFacts {
     /// Spin about each axis of the model at which the centrifugal term takes 1 % of the stiffness of a
     /// motion; `None` without W2 or with geometric stiffness for spin. Unit: Hz.
     pub softening_hz: Option<[Option<f64>; 3]>,
+    /// Spin about each axis of the model at which the stress stiffness that the body does not have changes 1 % of the
+    /// stiffness of a motion, by its estimate; `None` if nothing is missing. Unit: Hz.
+    pub stress_hz: Option<[Option<f64>; 3]>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -343,6 +346,7 @@ impl<'b> Facts<'b> {
                 geometric_stiffness: GeometricStiffnessFacts::of(body),
                 inertia_stiffness: InertiaStiffnessFacts::of(body),
                 softening_hz: softening_hz(body),
+                stress_hz: stress_hz(body),
                 worst_residual: worst_residual(body),
                 craig_bampton: CraigBamptonFacts::of(body),
                 held: HeldFacts::of(body),

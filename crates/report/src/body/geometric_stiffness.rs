@@ -90,18 +90,34 @@ pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
-/// Returns the spins in words: `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz of rotation about x, y,
-/// z of the model`.
-pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
-    let axes = ["x", "y", "z"].into_iter().zip(hertz);
-    let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
+/// Returns the spin about each axis of the model at which the missing stress stiffness, by its estimate, changes 1 % of the
+/// stiffness of some motion. Unit: Hz. Returns `None` for a body that lacks none.
+pub(super) fn stress_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
+    (!body.missing_stiffness(true).is_empty()).then(|| {
+        [0, 1, 2].map(|axis| {
+            let spins = body.dimension() == 3 || axis == 2;
+            let rate = spins.then(|| body.missing_rate(axis)).flatten();
+            rate.map(|rate| body.units().frequency_of(rate * rate))
+        })
+    })
+}
+
+/// Returns the spins in words, the lower one of both kinds about each axis: `no geometric stiffness: about 1 % of a stiffness
+/// is wrong at 12.5, 80.1, 79.9 Hz of rotation about x, y, z of the model (estimate)`.
+pub(super) fn missing_in_words(softening: Option<&[Option<f64>; 3]>, stress: &[Option<f64>; 3]) -> String {
+    let lower = |axis: usize| {
+        let both = [softening.and_then(|hertz| hertz[axis]), stress[axis]];
+        both.into_iter().flatten().reduce(f64::min)
+    };
+    let axes = ["x", "y", "z"].into_iter().enumerate();
+    let known: Vec<(&str, f64)> = axes.filter_map(|(at, axis)| Some((axis, lower(at)?))).collect();
     if known.is_empty() {
-        return "the centrifugal term softens no motion".to_owned();
+        return "no rotation changes the stiffness of a motion".to_owned();
     }
     let (rates, unit) = frequencies(&known.iter().map(|(_, hz)| *hz).collect::<Vec<f64>>(), 3);
     let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
     format!(
-        "no geometric stiffness: 1 % softer at {} {unit} of rotation about {} of the model",
+        "no geometric stiffness: about 1 % of a stiffness is wrong at {} {unit} of rotation about {} of the model (estimate)",
         rates.join(", "),
         axes.join(", ")
     )

@@ -3,7 +3,7 @@
 use super::completeness::{Completeness, GuaranteeFacts, cut};
 use super::craig_bampton::CraigBamptonFacts;
 use super::facts::{Facts, ModeFacts};
-use super::geometric_stiffness::softening_in_words;
+use super::geometric_stiffness::missing_in_words;
 use super::glossary::{word, word_as};
 use super::held::HeldFacts;
 use crate::document::{Block, Inline, Table, Term, cells, heading, listed, quantity};
@@ -181,8 +181,9 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(listed("geometric", &modes.geometric_stiffness, |one| one.in_words()));
     let inertia = modes.inertia_stiffness.as_ref();
     items.extend(inertia.map(|own| Term::new("Stiffness of inertia", own.in_words()).short("inertia K")));
-    items.extend(modes.softening_hz.as_ref().map(|hertz| {
-        Term::new(word_as("geometric stiffness", "Spin"), softening_in_words(hertz)).short("spin")
+    items.extend(modes.stress_hz.as_ref().map(|hertz| {
+        let words = missing_in_words(modes.softening_hz.as_ref(), hertz);
+        Term::new(word_as("geometric stiffness", "Spin"), words).short("spin")
     }));
     let decided: Vec<_> = facts.terms.iter().filter(|term| !term.kept || term.decision.is_some()).collect();
     items.extend(decided.iter().map(|term| Term::page("Kinetic energy", term.in_words())));

@@ -3,7 +3,7 @@
 
 use super::craig_bampton::CraigBamptonFacts;
 use super::facts::{Facts, InterfaceFacts, RecoveryFacts, RunFacts};
-use super::geometric_stiffness::softening_in_words;
+use super::geometric_stiffness::missing_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
 use super::named_loads::NamedLoadFacts;
 use crate::document::text::{self, Screen};
@@ -131,7 +131,8 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(
         modes.inertia_stiffness.as_ref().map(|own| entry(Tone::Plain, "inertia K", own.in_words(), 3)),
     );
-    items.extend(modes.softening_hz.as_ref().map(|hz| entry(Tone::Plain, "spin", softening_in_words(hz), 2)));
+    let missing = modes.stress_hz.as_ref().map(|hz| missing_in_words(modes.softening_hz.as_ref(), hz));
+    items.extend(missing.map(|words| entry(Tone::Plain, "spin", words, 2)));
     let dropped: Vec<_> = facts.terms.iter().filter(|term| !term.kept).collect();
     items.extend(listed_to(MAX_LISTED, "left out", &dropped, |term| {
         entry(Tone::Warning, "left out", term.in_words(), 3)

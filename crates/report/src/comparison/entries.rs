@@ -432,6 +432,11 @@ const NEVER_COMPARED: &[Entries] = &[
         has: |body| !body.parts().rotated_stiffness.is_empty(),
     },
     Entries {
+        name: "estimate of missing geometric stiffness",
+        paths: "/estimated_stiffness",
+        has: |body| !body.estimated_stiffness().is_empty(),
+    },
+    Entries {
         name: "matrices in interface coordinates, which `flexbody check` holds to the modes",
         paths: "/interface_coordinates",
         has: |body| body.coordinates().is_some(),

@@ -4,7 +4,7 @@ use super::errors::{ReferenceErrorFacts, error_in_words, errors_in_words, groups
 use crate::notation::numbers::{counted, frequency, significant};
 use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::selection::{DecisiveError, Selection};
+use flexbody_study::selection::{DecisiveError, NOT_JUDGED, Selection};
 use serde::Serialize;
 
 /// Ratio of the multiplications below which the saving is stated in percent.
@@ -152,7 +152,9 @@ fn reason(decision: &CommonDecision<'_>) -> String {
         groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
     let names = names.join(" and ");
     let Some(DecisiveError { output, error, tier, .. }) = decisive_error else {
-        return if *kept {
+        return if reason.starts_with(NOT_JUDGED) {
+            format!("{names}: {reason}")
+        } else if *kept {
             format!("keep {names}: {reason}")
         } else {
             let are = if groups.len() == 1 { "is" } else { "are" };
@@ -186,6 +188,11 @@ fn error(selection: &Selection) -> String {
         None => "; beside the body with all its modes, whose error relative to the FE model is not known"
             .to_owned(),
     };
+    let unstressed = selection.stress_error.as_ref().filter(|own| !own.is_small());
+    let unstressed = unstressed.map_or_else(String::new, |own| {
+        format!("; the stress of the spin, which the body does not have, changes {} (estimated)", own.in_words())
+    });
+    let reference_errors = reference_errors + &unstressed;
     match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
         Some(errors) => {
             let case = in_case(selection.chosen.as_ref().and_then(|chosen| chosen.case), selection);

@@ -70,6 +70,7 @@ fn complete() -> FlexBody {
         coupling: Some(Coupling::Averaging),
         reference: Some([x, 0.1, -0.2]),
     };
+    parts.estimated_stiffness = vec![load(LoadKind::Spin, 0)];
     parts.interfaces = vec![interface("left", [0, 1, 2, 5], -1.5), interface("right", [6, 7, 8, 11], 1.5)];
     parts.coordinates = Some(InterfaceCoordinates {
         names: (0..nf).map(|i| format!("coordinate {i}")).collect(),

@@ -7,6 +7,9 @@ use super::trial::Trial;
 use flexbody_body::flex_body::{TermDecision, TermGroup, TermGroups};
 use flexbody_linalg::ties::first_largest;
 
+/// Beginning of the reason of a decision that no error can support.
+pub const NOT_JUDGED: &str = "not judged";
+
 /// Error that decides about a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecisiveError {
@@ -66,6 +69,16 @@ impl DecisionInput<'_> {
             ),
             None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };
+        // The error of W2 alone decides nothing while the stress stiffness of the same order is missing.
+        let unstressed =
+            self.demands.iter().any(|demand| demand.stress_error.as_ref().is_some_and(|own| !own.is_small()));
+        if group == TermGroup::W2 && unstressed {
+            decided.reason = format!(
+                "{NOT_JUDGED}: centrifugal softening and the missing stress stiffness of the spin are of one order, and only together right ({})",
+                decided.reason
+            );
+            return (decided, None);
+        }
         // A run slower than the allowed rotation cannot decide about a kept group.
         let short = self.demands.iter().find_map(|demand| Some((demand, demand.short_of?)));
         if let Some((demand, (reached, allowed))) = short.filter(|_| kept) {

@@ -11,7 +11,8 @@ use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{
-    FramedScene, Load, LoadCases, PerQuantity, Point, Scene, Tolerance, damped_once, points_of,
+    FramedScene, Load, LoadCases, PerQuantity, Point, Scene, StressError, Tolerance, damped_once,
+    points_of,
 };
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -53,6 +54,8 @@ pub(super) struct Demand<'c> {
     pub by_bounds: Option<TermGroups>,
     /// Truncation errors of the body and of its versions before enrichment.
     pub reference_errors: &'c [ReferenceError],
+    /// Error of the missing stress stiffness of the spin; `None` if it is a small part of the tolerances or was not measured.
+    pub stress_error: Option<StressError>,
     /// Largest angular velocity of the runs and the allowed one; `None` if the runs reach the allowed one.
     pub short_of: Option<(f64, f64)>,
 }
@@ -81,6 +84,7 @@ impl<'c> Demand<'c> {
             by_bounds: bounds.iter().find(|trial| trial.passed()).map(|trial| trial.kept),
             bounds,
             reference_errors: &[],
+            stress_error: None,
             short_of: None,
         })
     }
@@ -95,9 +99,10 @@ impl<'c> Demand<'c> {
         &self.scene.requirements.tolerance
     }
 
-    /// Returns the part of the tolerances left after the truncation error of the body and the bounds.
-    pub(super) fn budget(&self) -> f64 {
-        let left = ReferenceError::left(self.reference_errors);
+    /// Returns the part of the tolerances left after the truncation error of the body, the missing stress stiffness and the
+    /// bounds.
+    pub(super) fn budget(&self, stress_error: Option<&StressError>) -> f64 {
+        let left = ReferenceError::left(self.reference_errors) * StressError::left(stress_error);
         if self.by_bounds.is_none() {
             return left;
         }

@@ -18,7 +18,7 @@ mod variations;
 pub use bounds::{
     Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Rotation, Start, TorqueDefect, Variation,
 };
-pub use decisions::DecisiveError;
+pub use decisions::{DecisiveError, NOT_JUDGED};
 pub use demand::{BEYOND_BAND, Participation, WantedResponses, largest_eigenvalue, participations};
 pub use norms::Norms;
 pub use search::most_excited_modes;

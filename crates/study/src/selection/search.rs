@@ -13,8 +13,10 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::FREE_MODE;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
-use flexbody_linalg::ties::{TIE_MARGIN, descending};
-use flexbody_motion::scene::{Axes, History, LoadCases, Measure, Scene, Tolerance, Trace, VectorHistory};
+use flexbody_linalg::ties::{TIE_MARGIN, descending, first_largest};
+use flexbody_motion::scene::{
+    Axes, History, LoadCases, Measure, Scene, StressError, Tolerance, Trace, VectorHistory,
+};
 use std::f64::consts::TAU;
 
 /// Trials and current choice of a selection.
@@ -25,6 +27,8 @@ pub(super) struct SelectionState<'s> {
     /// Largest angular velocity of the runs and the allowed one, for each load case; `None` if the runs reach the
     /// allowed one.
     pub short_of: Vec<Option<(f64, f64)>>,
+    /// Error of the missing stress stiffness of the spin in each load case.
+    pub stress_errors: Vec<Option<StressError>>,
     /// Measured trial of the chosen model in each load case.
     pub chosen_by_case: Vec<Trial>,
     /// Errors of the chosen model in variations of the scene.
@@ -54,10 +58,20 @@ impl<'s> SelectionState<'s> {
             shares: Vec::new(),
             chosen: None,
         };
-        let short_of = vec![None; demands.len()];
+        let (short_of, stress_errors) = (vec![None; demands.len()], vec![None; demands.len()]);
         let (chosen_by_case, varied) = (Vec::new(), Vec::new());
         let groups_of_variations = TermGroups::NONE;
-        Self { demands, choice, trials, short_of, chosen_by_case, varied, groups_of_variations, diagnostics }
+        Self {
+            demands,
+            choice,
+            trials,
+            short_of,
+            stress_errors,
+            chosen_by_case,
+            varied,
+            groups_of_variations,
+            diagnostics,
+        }
     }
 
     /// Returns true if all load cases have a duration, so that motion can be measured.
@@ -101,9 +115,9 @@ impl<'s> SelectionState<'s> {
         context.runs(self.demands.iter().map(|demand| demand.cases.len()).sum());
         let references = self.reference_motions()?;
         let demands = self.demands;
-        let both = demands.iter().zip(&references);
+        let all = demands.iter().zip(&references).zip(&self.stress_errors);
         let cases: Vec<TestedCase<'_>> =
-            both.map(|(demand, motions)| Self::tested_case(demand, motions)).collect();
+            all.map(|((demand, motions), stress)| Self::tested_case(demand, motions, stress.as_ref())).collect();
         context.phase("trials");
         let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
         let search = SelectionSearch {
@@ -120,7 +134,11 @@ impl<'s> SelectionState<'s> {
         Ok(reason)
     }
 
-    fn tested_case<'t>(demand: &'t Demand<'t>, references: &'t [Trace]) -> TestedCase<'t> {
+    fn tested_case<'t>(
+        demand: &'t Demand<'t>,
+        references: &'t [Trace],
+        stress_error: Option<&StressError>,
+    ) -> TestedCase<'t> {
         let scenes = demand.cases.iter().zip(references);
         TestedCase {
             scenes: scenes
@@ -129,7 +147,7 @@ impl<'s> SelectionState<'s> {
                     measure: Measure::new(demand.body, case.runs().scene, trace),
                 })
                 .collect(),
-            budget: demand.budget(),
+            budget: demand.budget(stress_error),
         }
     }
 
@@ -137,7 +155,8 @@ impl<'s> SelectionState<'s> {
     /// case.
     fn reference_motions(&mut self) -> Result<Vec<Vec<Trace>>> {
         let mut by_case = Vec::new();
-        for (demand, short_of) in self.demands.iter().zip(&mut self.short_of) {
+        let of_cases = self.short_of.iter_mut().zip(&mut self.stress_errors);
+        for (demand, (short_of, stress_error)) in self.demands.iter().zip(of_cases) {
             let mut references = Vec::new();
             for case in &demand.cases {
                 let (reference, said) =
@@ -146,8 +165,12 @@ impl<'s> SelectionState<'s> {
                         None => error,
                     })?;
                 self.diagnostics.extend(said.into_iter().map(|said| demand.about(said)));
+                let own = case.runs().stress_error(demand.groups(), &reference)?;
+                *stress_error = first_largest(stress_error.take().into_iter().chain(own), |one| one.worst);
                 references.push(reference);
             }
+            let warning = stress_error.as_ref().and_then(|own| own.warning(demand.body));
+            self.diagnostics.extend(warning.map(|said| demand.about(said)));
             let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
             let allowed = demand.situation.spin.value;
             let is_given = demand.scene.requirements.motion.angular_velocity.is_some();

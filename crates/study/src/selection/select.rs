@@ -14,7 +14,7 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::ties::first_largest;
-use flexbody_motion::scene::{LoadCases, PerQuantity, Tolerance};
+use flexbody_motion::scene::{LoadCases, PerQuantity, StressError, Tolerance};
 
 /// Result of a selection, with the reasons.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +61,9 @@ pub struct Selection {
     /// if no model is at hand or nothing can be estimated. For several load cases, those of the case with the largest
     /// last error.
     pub reference_errors: Vec<ReferenceError>,
+    /// Largest error of any load case by the stress stiffness of the spin that the body does not have; `None` if nothing is
+    /// missing, or if the error is a small part of the tolerances.
+    pub stress_error: Option<StressError>,
     /// Results for each load case; empty for a single scene.
     pub cases: Vec<CaseSelection>,
     /// Errors of the selected model in variations of the scene, whose motions did not choose it.
@@ -70,12 +73,13 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Returns true if the requirement holds: the cost, or else the measured errors, relative to a body whose
-    /// truncation error takes at most half of the tolerances, also in every stated variation. True if nothing was
-    /// measured.
+    /// Returns true if the requirement holds: the cost, or else the measured errors, relative to a body whose truncation error
+    /// and missing stress stiffness take at most half of the tolerances each, also in every stated variation. True if nothing
+    /// was measured.
     pub fn holds(&self) -> bool {
         let in_variations = self.varied.iter().all(|one| one.holds() || !one.is_stated);
-        let is_reference = self.reference_errors.last().is_none_or(ReferenceError::is_reference);
+        let is_reference = self.reference_errors.last().is_none_or(ReferenceError::is_reference)
+            && self.stress_error.as_ref().is_none_or(StressError::is_small);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
             Some(most) => chosen.multiplications <= most,
             None => chosen.passed() && is_reference && in_variations,
@@ -186,13 +190,14 @@ pub fn select_judged(
         trials,
         diagnostics,
         short_of,
+        stress_errors,
         chosen_by_case,
         varied,
         groups_of_variations,
         ..
     } = selection_state;
-    for (demand, short_of) in demands.iter_mut().zip(short_of) {
-        demand.short_of = short_of;
+    for (demand, (short_of, stress_error)) in demands.iter_mut().zip(short_of.into_iter().zip(stress_errors)) {
+        (demand.short_of, demand.stress_error) = (short_of, stress_error);
     }
     // Decide for the model that the scene alone needs, then for what variations add to it.
     let groups = choice.groups;
@@ -229,6 +234,7 @@ pub fn select_judged(
         most_multiplications: first.scene.requirements.multiplications,
         trials,
         reference_errors: worst_reference_errors(&demands),
+        stress_error: first_largest(demands.iter().filter_map(|one| one.stress_error.clone()), |one| one.worst),
         diagnostics: once(diagnostics),
     })
 }

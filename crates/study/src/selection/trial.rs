@@ -11,7 +11,7 @@ use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
     ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, RecoveryMeasure, Resolution, Scene,
-    Spin, Trace, ends_a_run, simulate, trace, trace_at,
+    Spin, StressError, Trace, ends_a_run, simulate, trace, trace_at,
 };
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
@@ -86,6 +86,16 @@ impl TrialRuns<'_> {
         let mut scene = self.scene.clone();
         scene.run.terms = self.terms(kept);
         trace(self.body, &scene, &self.context)
+    }
+
+    /// Measures the error of the missing stress stiffness of the spin in `own`, the motion with the groups `kept`.
+    ///
+    /// # Errors
+    /// The errors of [`StressError::of_trace`].
+    pub fn stress_error(&self, kept: TermGroups, own: &Trace) -> Result<Option<StressError>> {
+        let mut scene = self.scene.clone();
+        scene.run.terms = self.terms(kept);
+        StressError::of_trace(self.body, &scene, own, &self.context)
     }
 
     /// Returns the terms of a model with the groups `kept`: with geometric stiffness unless the scene switches it off.

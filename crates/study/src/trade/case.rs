@@ -18,8 +18,8 @@ use flexbody_linalg::ties::first_largest;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
-    FramedScene, LoadCases, Measure, Scene, SceneVariation, Scheme, Tolerance, Trace, ends_a_run, trace,
-    trace_at,
+    FramedScene, LoadCases, Measure, Scene, SceneVariation, Scheme, StressError, Tolerance, Trace,
+    ends_a_run, trace, trace_at,
 };
 
 /// Scene (a single one or a load case) with the motion of the reference in it.
@@ -31,8 +31,10 @@ pub(super) struct StudyCase<'m> {
     pub scene: Scene,
     pub motion: Trace,
     pub nodal: Option<NodalReference<'m>>,
-    /// Part of the tolerances that the truncation error of the reference takes.
+    /// Part of the tolerances that the truncation error of the reference and its missing stress stiffness take.
     pub reserved: f64,
+    /// Error of the missing stress stiffness of the spin in the motion of the reference.
+    pub stress_error: Option<StressError>,
     /// Warnings and notes about the motion of the reference.
     pub found: Vec<Diagnostic>,
 }
@@ -67,9 +69,12 @@ impl<'m> StudyCase<'m> {
             }
             None => None,
         };
+        let stress_error = StressError::of_trace(sources[0].body(), &scene, &motion, context)?;
+        let reserved = 1.0 - (1.0 - reserved) * StressError::left(stress_error.as_ref());
         let warning = nodal.as_ref().and_then(NodalReference::warning);
-        let found = [framed.found, said, Vec::from_iter(warning)].concat();
-        let mut own = Self { name, sources, scene, motion, nodal, reserved, found };
+        let unstressed = stress_error.as_ref().and_then(|own| own.warning(sources[0].body()));
+        let found = [framed.found, said, warning.into_iter().chain(unstressed).collect()].concat();
+        let mut own = Self { name, sources, scene, motion, nodal, reserved, stress_error, found };
         own.found = std::mem::take(&mut own.found).into_iter().map(|said| own.about(said)).collect();
         Ok(own)
     }

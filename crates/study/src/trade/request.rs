@@ -60,7 +60,8 @@ impl TradeStudy {
         let is_nodal = self.trade.reference == ReferenceKind::Nodal;
         let is_reference =
             |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
-        let is_reference = is_nodal || self.reference_errors.iter().all(is_reference);
+        let is_reference =
+            (is_nodal || self.reference_errors.iter().all(is_reference)) && self.trade.is_stressed();
         self.trade.recommended.row().is_some() && is_reference && self.trade.holds_in_stated_variations()
     }
 

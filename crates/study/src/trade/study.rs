@@ -15,7 +15,7 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::parallel;
 use flexbody_linalg::ties::first_largest;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
+use flexbody_motion::scene::{LoadCases, Measure, Scene, StressError, Tolerance, ends_a_run};
 
 /// Settings of a trade study.
 #[derive(Debug, Clone, Copy)]
@@ -99,8 +99,12 @@ pub struct TradeCase {
     pub name: Option<String>,
     /// Tolerances of the load case.
     pub tolerance: Tolerance,
-    /// Part of the tolerances that the truncation error of the reference takes: candidates get the rest.
+    /// Part of the tolerances that the truncation error of the reference and its missing stress stiffness take: candidates
+    /// get the rest.
     pub reserved: f64,
+    /// Error of the missing stress stiffness of the spin in the motion of the reference; `None` if nothing is missing, or if
+    /// the error is a small part of the tolerances.
+    pub stress_error: Option<StressError>,
     /// Integration of the equations of all nodes; `None` if they are not the reference.
     pub nodal: Option<NodalIntegration>,
     /// Recommended row if this were the only load case.
@@ -112,6 +116,12 @@ pub struct TradeCase {
 }
 
 impl Trade {
+    /// Returns true if the stress stiffness that the reference does not have leaves at least half of the tolerances in every
+    /// load case.
+    pub fn is_stressed(&self) -> bool {
+        self.cases.iter().filter_map(|case| case.stress_error.as_ref()).all(StressError::is_small)
+    }
+
     /// Returns true if the recommended row holds in all variations that the scene file states, or if it states none.
     pub fn holds_in_stated_variations(&self) -> bool {
         let recommended = self.recommended.row().and_then(|row| self.rows[row].outcome.as_ref().ok());
@@ -204,6 +214,7 @@ impl TradeCase {
             name: case.name.clone(),
             tolerance: case.scene.requirements.tolerance,
             reserved: case.reserved,
+            stress_error: case.stress_error.clone(),
             nodal: case.nodal.as_ref().map(NodalReference::integration),
             alone: Recommendation::cheapest(rows, |measured| is_within(measured, at, most)),
             ruled_out_alone: ruled_out.iter().filter(|own| own.beyond == 1).count(),

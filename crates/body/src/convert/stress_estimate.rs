@@ -1,0 +1,258 @@
+//! Estimate of the geometric stiffness of spin from K, M and the nodes alone, for a model that does not have it.
+//!
+//! For solids K_geo is one number for each pair of nodes that an element joins, the force density g_ab of the pair, with
+//! sum_b g_ab (x_a - x_b) = f_a for the load f that the stress carries, inertia relief included (theory section 7). The
+//! estimate takes the force densities of a truss with a bar between the nodes of every pair that K couples, of the
+//! stiffness |K_ab| / L, under this load. It fulfils the same relations as K_geo, and stresses between equal
+//! resultants differ little in their effect on modes: the largest relative change of stiffness is 0.85 to 1.25 times the
+//! true one on nine solids and on 196 of 200 random blocks, plates and frames, and at least 0.26 times (one element).
+//!
+//! Nodes with rotations carry forces by bending too, so that a truss has too few forces: the force of a pair of such nodes
+//! follows from the elongation under the static response of the body, N = -(d'K_ab d / L^2) elongation. It is exact for beams;
+//! for shells the change of stiffness is 0.64 to 1.65 times the true one.
+
+use super::body_modes::reduced;
+use crate::basis::{CoupledModel, accurate_static_responses, centrifugal_loads, rigid_modes};
+use crate::flex_body::{Frame, along};
+use faer::Mat;
+use flexbody_base::error::Result;
+use flexbody_linalg::context::Context;
+use flexbody_linalg::{
+    Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix, combine, gram, side_by_side,
+};
+use flexbody_model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
+
+/// Stiffness at every node relative to that of its bars, which keeps a truss with mechanisms solvable. A larger value takes
+/// force from bars between bodies that hardly touch.
+const RELATIVE_SUPPORT: f64 = 1e-9;
+
+/// Block of K between two nodes, relative to the largest block of one of them, below which the nodes are not joined.
+const MIN_COUPLING: f64 = 1e-9;
+
+/// Returns the estimate of Psi' K_geo Psi for each component of spin about the centre of mass that the model has no
+/// geometric stiffness for, along the axes of `frame`. Empty if the model has all of them, or if the truss has no
+/// solution.
+///
+/// * `vectors`: modes (N x nf) in rows and axes of the model.
+/// * `first`: about the first flexible eigenvalue.
+///
+/// # Errors
+/// The errors of [`rigid_modes`], and failures of the static responses of a model with rotations.
+pub(super) fn estimated_stiffness(
+    model: &FeModel,
+    vectors: &Mat<f64>,
+    first: f64,
+    frame: &Frame,
+    context: &Context<'_>,
+) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
+    let components = LoadKind::Spin.of_dimension(model.dimension());
+    let load = |component: usize| UnitLoad { kind: LoadKind::Spin, component };
+    let is_missing =
+        |component: &usize| model.geometric_stiffness().iter().all(|one| one.load != load(*component));
+    let missing: Vec<usize> = (0..components.len()).filter(|at| is_missing(&components[*at])).collect();
+    if missing.is_empty() {
+        return Ok(Vec::new());
+    }
+    let pairs = Pairs::new(model);
+    let Some(densities) = pairs.force_densities(model, first, context)? else { return Ok(Vec::new()) };
+    // Displacements of the nodes along each axis: K_geo is the same for all axes.
+    let (n, d) = (model.nodes().len(), model.dimension());
+    let along_axis = |k: usize| Mat::from_fn(n, vectors.ncols(), |i, j| vectors[(d * i + k, j)]);
+    let shapes: Vec<Mat<f64>> = (0..d).map(along_axis).collect();
+    let of_load = |&at: &usize| {
+        let scalar = pairs.stiffness(&densities[at]);
+        let matrix = shapes.iter().map(|shape| reduced(&scalar, shape.as_ref())).reduce(|a, b| a + b);
+        let matrix = matrix.expect("a model has an axis");
+        GeometricStiffness { load: load(components[at]), matrix }
+    };
+    let all: Vec<_> = missing.iter().map(of_load).collect();
+    let is_finite = |one: &GeometricStiffness<Mat<f64>>| one.matrix.norm_max().is_finite();
+    Ok(if all.iter().all(is_finite) { along(&all, &frame.axes) } else { Vec::new() })
+}
+
+/// Pair of nodes that K couples.
+struct Pair {
+    nodes: [usize; 2],
+    /// Vector from the second node to the first.
+    apart: [f64; 3],
+    /// Force density of the bar per unit of `apart` times the difference of the displacements: |K_ab| / L^3.
+    weight: f64,
+    /// -d'K_ab d / L^4 of the vector d between the nodes.
+    axial: f64,
+}
+
+impl Pair {
+    /// Returns the vector between the nodes times the difference of their displacements, of column `c` of `fields` with `d`
+    /// rows per node.
+    fn elongation(&self, fields: &Mat<f64>, d: usize, c: usize) -> f64 {
+        let [a, b] = self.nodes;
+        (0..d).map(|k| self.apart[k] * (fields[(d * a + k, c)] - fields[(d * b + k, c)])).sum()
+    }
+}
+
+/// Pairs of nodes that K couples, and the nodes that resist rotation.
+struct Pairs {
+    pairs: Vec<Pair>,
+    nodes: usize,
+    dimension: usize,
+    turns: Vec<bool>,
+}
+
+impl Pairs {
+    fn new(model: &FeModel) -> Self {
+        let (n, d) = (model.nodes().len(), model.dimension());
+        let stiffness = model.stiffness();
+        let first = model.rows().displacements();
+        let mut turns = vec![false; n];
+        for (at, &(node, _)) in model.rows().rotations().iter().enumerate() {
+            turns[node as usize] |= stiffness.row(first + at).1.iter().any(|value| *value != 0.0);
+        }
+        let mut largest = vec![0.0f64; n];
+        let blocks: Vec<Vec<(usize, [f64; 9])>> = (0..n).map(|a| blocks_of(stiffness, n, d, a)).collect();
+        let norm = |block: &[f64; 9]| block.iter().map(|value| value * value).sum::<f64>().sqrt();
+        for (a, row) in blocks.iter().enumerate() {
+            largest[a] = row.iter().map(|(_, block)| norm(block)).fold(0.0, f64::max);
+        }
+        let mut pairs = Vec::new();
+        for (a, row) in blocks.iter().enumerate() {
+            for (b, block) in row.iter().filter(|(b, _)| *b > a) {
+                let (x, y) = (model.nodes().positions[a], model.nodes().positions[*b]);
+                let apart: [f64; 3] = std::array::from_fn(|k| x[k] - y[k]);
+                let square: f64 = apart.iter().map(|c| c * c).sum();
+                let size = norm(block);
+                if square > 0.0 && size > MIN_COUPLING * largest[a].max(largest[*b]) {
+                    let product = |i: usize| (0..3).map(|j| block[3 * i + j] * apart[j]).sum::<f64>();
+                    let axial = -(0..3).map(|i| apart[i] * product(i)).sum::<f64>() / (square * square);
+                    let weight = size / (square * square.sqrt());
+                    pairs.push(Pair { nodes: [a, *b], apart, weight, axial });
+                }
+            }
+        }
+        Self { pairs, nodes: n, dimension: d, turns }
+    }
+
+    /// Returns true if both nodes of a pair resist rotation.
+    fn bends(&self, pair: &Pair) -> bool {
+        pair.nodes.iter().all(|&node| self.turns[node])
+    }
+
+    /// Returns the force densities of all pairs under each centrifugal load; `None` if the truss has no solution.
+    fn force_densities(
+        &self,
+        model: &FeModel,
+        first: f64,
+        context: &Context<'_>,
+    ) -> Result<Option<Vec<Vec<f64>>>> {
+        let d = self.dimension;
+        // Loads with inertia relief.
+        let loads = centrifugal_loads(model);
+        let loads = side_by_side(&loads.iter().map(Mat::as_ref).collect::<Vec<_>>());
+        let rigid = rigid_modes(model, &model.pencil())?;
+        let inertial = model.pencil().apply_mass(rigid.as_ref());
+        let balanced = &loads - combine(inertial.as_ref(), gram(rigid.as_ref(), loads.as_ref()).as_ref());
+        let mut densities = vec![vec![0.0; self.pairs.len()]; loads.ncols()];
+        // Pairs of nodes that resist rotation: the elongation under the static response of the body.
+        if self.turns.contains(&true) {
+            let response =
+                accurate_static_responses(&CoupledModel::uncoupled(model), loads.clone(), first, context)?;
+            for (c, of_load) in densities.iter_mut().enumerate() {
+                for (density, pair) in of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| self.bends(pair)) {
+                    *density = pair.axial * pair.elongation(&response, d, c);
+                }
+            }
+        }
+        // All other pairs: a truss under the forces that are left, on nodes that resist rotation as supports.
+        if self.turns.contains(&false) {
+            let Some(moved) = self.truss(&balanced, &densities) else { return Ok(None) };
+            for (c, of_load) in densities.iter_mut().enumerate() {
+                for (density, pair) in of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| !self.bends(pair)) {
+                    *density = pair.weight * pair.elongation(&moved, d, c);
+                }
+            }
+        }
+        Ok(Some(densities))
+    }
+
+    /// Returns the displacements of the truss under `loads` less the forces of the known `densities`; `None` if it has no
+    /// solution.
+    fn truss(&self, loads: &Mat<f64>, densities: &[Vec<f64>]) -> Option<Mat<f64>> {
+        let (n, d) = (self.nodes, self.dimension);
+        let mut forces =
+            Mat::from_fn(d * n, loads.ncols(), |row, c| if self.turns[row / d] { 0.0 } else { loads[(row, c)] });
+        for (c, of_load) in densities.iter().enumerate() {
+            for (density, pair) in of_load.iter().zip(&self.pairs) {
+                for (node, sign) in pair.nodes.into_iter().zip([1.0, -1.0]).filter(|(node, _)| !self.turns[*node]) {
+                    (0..d).for_each(|k| forces[(d * node + k, c)] -= sign * density * pair.apart[k]);
+                }
+            }
+        }
+        let (bars, support) = self.bars()?;
+        let pencil = Pencil::new(&bars, &support, d);
+        let analysis = Analysis::new(&pencil)?;
+        let factor = Cholesky::<f64>::new(&analysis, &pencil, RELATIVE_SUPPORT)?;
+        factor.solve_in_place(forces.as_mut());
+        Some(forces)
+    }
+
+    /// Returns the stiffness of the bars, with nodes that resist rotation held, and its size at each node on a diagonal (n x n).
+    fn bars(&self) -> Option<(SymmetricMatrix, SymmetricMatrix)> {
+        let (n, d) = (self.nodes, self.dimension);
+        let mut triplets = Vec::new();
+        let mut sizes = vec![0.0f64; n];
+        for pair in self.pairs.iter().filter(|pair| !self.bends(pair)) {
+            let [a, b] = pair.nodes;
+            let held = [self.turns[a], self.turns[b]];
+            for (i, j) in (0..d).flat_map(|i| (0..d).map(move |j| (i, j))) {
+                let value = pair.weight * pair.apart[i] * pair.apart[j];
+                let row = |node: usize, k: usize| (d * node + k) as u32;
+                for node in pair.nodes.into_iter().filter(|node| !self.turns[*node]) {
+                    triplets.push((row(node, i), row(node, j), value));
+                    sizes[node] += if i == j { value / d as f64 } else { 0.0 };
+                }
+                if !held[0] && !held[1] {
+                    triplets.push((row(a, i), row(b, j), -value));
+                    triplets.push((row(b, j), row(a, i), -value));
+                }
+            }
+        }
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        // Nodes without bars carry nothing.
+        let idle = if largest > 0.0 { largest } else { 1.0 };
+        let is_idle = |row: &usize| sizes[*row / d] == 0.0;
+        triplets.extend((0..d * n).filter(is_idle).map(|row| (row as u32, row as u32, idle)));
+        let size = |node: usize| if sizes[node] > 0.0 { sizes[node] } else { idle };
+        let diagonal: Vec<_> = (0..n).map(|node| (node as u32, node as u32, size(node))).collect();
+        let bars = CscMatrix::from_triplets(d * n, d * n, &triplets);
+        let support = CscMatrix::from_triplets(n, n, &diagonal);
+        Some((SymmetricMatrix::symmetrised(bars), SymmetricMatrix::new(support)?))
+    }
+
+    /// Returns the scalar matrix (n x n) of force densities: row a times the positions is the force at node a.
+    fn stiffness(&self, densities: &[f64]) -> SymmetricMatrix {
+        let mut triplets = Vec::with_capacity(4 * self.pairs.len());
+        for (&density, pair) in densities.iter().zip(&self.pairs) {
+            let [a, b] = pair.nodes.map(|node| node as u32);
+            triplets.extend([(a, a, density), (b, b, density), (a, b, -density), (b, a, -density)]);
+        }
+        SymmetricMatrix::symmetrised(CscMatrix::from_triplets(self.nodes, self.nodes, &triplets))
+    }
+}
+
+/// Returns the blocks of the displacements of node `a` and all other nodes, by ascending node; a block holds 3 x 3 numbers.
+fn blocks_of(stiffness: &SymmetricMatrix, n: usize, d: usize, a: usize) -> Vec<(usize, [f64; 9])> {
+    let mut entries: Vec<(usize, usize, f64)> = Vec::new();
+    for i in 0..d {
+        let (columns, values) = stiffness.row(d * a + i);
+        for (&column, &value) in columns.iter().zip(values).filter(|(column, _)| (**column as usize) < d * n) {
+            entries.push((column as usize / d, 3 * i + column as usize % d, value));
+        }
+    }
+    entries.sort_by_key(|entry| (entry.0, entry.1));
+    let same_node = entries.chunk_by(|one, other| one.0 == other.0).filter(|chunk| chunk[0].0 != a);
+    let block = |chunk: &[(usize, usize, f64)]| {
+        let mut block = [0.0; 9];
+        chunk.iter().for_each(|&(_, at, value)| block[at] += value);
+        (chunk[0].0, block)
+    };
+    same_node.map(block).collect()
+}
