@@ -31,11 +31,12 @@ class Element:
 
     def __init__(self, kind):
         count = int(re.match(r"C3D(\d+)", kind).group(1))
+        full = count == 20 and not kind.endswith("R")
         line2, line3 = np.array([-1, 1]) / np.sqrt(3), np.array([-1, 0, 1]) * np.sqrt(0.6)
         if count in (8, 20):
             corners, edges = 2.0 * CORNERS - 1, HEX_EDGES if count == 20 else []
             monomials = powers(superlinear, 2) if count == 20 else powers(lambda p: True, 1)
-            line, weight = (line3, np.array([5, 8, 5]) / 9) if count == 20 else (line2, np.ones(2))
+            line, weight = (line3, np.array([5, 8, 5]) / 9) if full else (line2, np.ones(2))
             self.points = list(itertools.product(line, repeat=3))
             self.weights = [np.prod(w) for w in itertools.product(weight, repeat=3)]
         else:
@@ -73,14 +74,34 @@ class Element:
         return total
 
 
-class Part:
-    """A part of one kind of element along x, as a job of CalculiX. `place` maps the unit cube to the part; `units` is m or mm; `turn` its attitude."""
+    def stiffness(self, x, young, poisson):
+        """Stiffness of nodes at x, rows node by node."""
+        lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
+        elasticity = np.diag([2 * shear] * 3 + [shear] * 3)
+        elasticity[:3, :3] += lame
+        total = 0.0
+        for xi, weight in zip(self.points, self.weights):
+            slope = self.slopes(xi)
+            jacobian = x.T @ slope
+            gradient = slope @ np.linalg.inv(jacobian)
+            strain = np.zeros((6, gradient.size))
+            for k in range(3):
+                strain[k, k::3] = gradient[:, k]
+            for row, (a, b) in enumerate(((0, 1), (1, 2), (0, 2)), 3):
+                strain[row, a::3], strain[row, b::3] = gradient[:, b], gradient[:, a]
+            total = total + weight * np.linalg.det(jacobian) * strain.T @ elasticity @ strain
+        return (total + total.T) / 2
 
-    def __init__(self, kind, cells, place, units="m", turn=np.eye(3)):
+
+class Part:
+    """A part of one kind of element along x, as a job of CalculiX. `place` maps the unit cube to the part; `units` is m or mm; `turn` its
+    attitude; `closed` joins its two sides along y."""
+
+    def __init__(self, kind, cells, place, units="m", turn=np.eye(3), closed=False, poisson=0.3):
         self.kind, self.units, self.element = kind, units, Element(kind)
         self.scale = {"m": 1.0, "mm": 1000.0}[units]
         self.young, self.density = {"m": (2.1e11, 7850.0), "mm": (2.1e5, 7.85e-9)}[units]
-        self.poisson = 0.3
+        self.poisson = poisson
         corners = len(CORNERS if len(self.element.nodes) in (8, 20) else TET_CORNERS)
         parts = [tuple(range(8))] if corners == 8 else TETRAHEDRA
         edges = {8: HEX_EDGES, 4: TET_EDGES}[corners] if len(self.element.nodes) > corners else []
@@ -90,6 +111,8 @@ class Part:
             for nodes in parts:
                 lattice = [own[k] for k in nodes]
                 lattice += [tuple((np.array(lattice[i]) + lattice[j]) // 2) for i, j in edges]
+                around = 2 * cells[1] if closed else sys.maxsize
+                lattice = [(x, y % around, z) for x, y, z in lattice]
                 self.elements.append([numbers.setdefault(at, len(numbers)) for at in lattice])
         self.lattice = np.array(list(numbers)) / (2 * np.array(cells))
         points = np.array([turn @ place(*at) * self.scale for at in self.lattice])
@@ -109,13 +132,13 @@ class Part:
         lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{self.young}, {self.poisson}", "*DENSITY", f"{self.density}", "*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL"]
         return "\n".join(lines) + "\n"
 
-    def write(self, folder, coupling):
-        """The job, run, and its manifest."""
+    def write(self, folder, coupling, ends=("root", "tip")):
+        """The job and its manifest, with interfaces at `ends`."""
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "job.inp").write_text(self.mesh() + "*STEP\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n4\n*END STEP\n")
         mass = {"m": "kg", "mm": "tonne"}[self.units]
         manifest = f'[model]\nname = "part"\n[model.units]\nlength = "{self.units}"\nmass = "{mass}"\ntime = "s"\n[files]\njob = "job.inp"\n'
-        for name in self.ends:
+        for name in ends:
             manifest += f'[[interface]]\nname = "{name}"\nset = "{name.upper()}"\ncoupling = "{coupling}"\nreference = {self.reference(name).tolist()}\n'
         (folder / "model.toml").write_text(manifest)
 
@@ -130,15 +153,27 @@ class Part:
 
     def stress_stiffness(self, u):
         """K_geo of displacements (3n) by element code."""
+        return sp.kron(self.by_nodes(u), sp.identity(3)).tocsr()
+
+    def by_nodes(self, u):
+        """The matrix whose Kronecker product with I3 is K_geo."""
         u = u.reshape(-1, 3)
+        return self.assembled(lambda nodes: self.element.stress_stiffness(self.points[nodes], u[nodes], self.young, self.poisson), 1)
+
+    def stiffness(self):
+        """K by element code, with all digits."""
+        return self.assembled(lambda nodes: self.element.stiffness(self.points[nodes], self.young, self.poisson), 3)
+
+    def assembled(self, of_element, each):
+        """Sum of matrices of elements with a number of rows for each node."""
         rows, columns, values = [], [], []
         for nodes in self.elements:
-            block = self.element.stress_stiffness(self.points[nodes], u[nodes], self.young, self.poisson)
-            rows.append(np.repeat(nodes, len(nodes)))
-            columns.append(np.tile(nodes, len(nodes)))
+            block = of_element(nodes)
+            own = (each * np.array(nodes)[:, None] + np.arange(each)).ravel()
+            rows.append(np.repeat(own, len(own)))
+            columns.append(np.tile(own, len(own)))
             values.append(block.ravel())
-        scalar = sp.coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(len(self.ids),) * 2)
-        return sp.kron(scalar, sp.identity(3)).tocsr()
+        return sp.coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(each * len(self.ids),) * 2).tocsr()
 
     def rigid(self, about=np.zeros(3)):
         motions = np.zeros((3 * len(self.ids), 6))
@@ -197,23 +232,59 @@ def given(part, folder):
         yield kind, table[kind], table.get("interface"), (stressed - plain) / table["load_size"]
 
 
+class Responses:
+    """Static responses of a free part to loads that its inertia balances."""
+
+    def __init__(self, part, folder):
+        self.part = part
+        self.k, self.m = part.matrices(folder), full(folder / "job.mas", *part.rows(folder / "job.dof"))
+        rigid = part.rigid()
+        momenta = self.m @ rigid
+        self.relief = momenta @ np.linalg.solve(rigid.T @ momenta, rigid.T)
+        self.inverse = np.linalg.pinv(self.k.toarray(), rcond=1e-11, hermitian=True)
+
+    def to(self, load):
+        balanced = load - self.relief @ load
+        response = self.inverse @ balanced
+        # One step of refinement removes the error of the inverse.
+        return response + self.inverse @ (balanced - self.k @ response)
+
+    def to_spin(self, a, b, axes=np.eye(3)):
+        """Response to the centrifugal forces of a product of two unit spin rates about columns of `axes`."""
+        e, x = axes.T, self.part.points
+        pair = lambda a, b: np.cross(e[a], np.cross(e[b], x))
+        return self.to(-(self.m @ (pair(a, a) if a == b else pair(a, b) + pair(b, a)).ravel()))
+
+    def to_interface(self, interface, kind, axis):
+        """Response to a unit force or moment along an axis at an interface."""
+        return self.to(self.part.at(interface)[:, {"force": slice(0, 3), "moment": slice(3, 6)}[kind]] @ axis)
+
+
 def by_element_code(part, folder):
     """Largest difference of K_geo from element code over all loads, relative to the largest entry of each, and the number of loads."""
-    k, m = part.matrices(folder), full(folder / "job.mas", *part.rows(folder / "job.dof"))
-    rigid = part.rigid()
-    momenta = m @ rigid
-    relief = momenta @ np.linalg.solve(rigid.T @ momenta, rigid.T)
-    solve = np.linalg.pinv(k.toarray(), rcond=1e-11, hermitian=True)
+    responses = Responses(part, folder)
     worst, count = 0.0, 0
     for kind, axis, interface, found in given(part, folder):
         if kind == "spin":
-            a, b = ("xyz".index(letter) for letter in axis)
-            e = np.eye(3)
-            pair = lambda a, b: np.cross(e[a], np.cross(e[b], part.points))
-            load = -(m @ (pair(a, a) if a == b else pair(a, b) + pair(b, a)).ravel())
+            moved = responses.to_spin(*("xyz".index(letter) for letter in axis))
         else:
-            load = part.at(interface)[:, "xyz".index(axis) + (3 if kind == "moment" else 0)]
-        expected = part.stress_stiffness(solve @ (load - relief @ load))
+            moved = responses.to_interface(interface, kind, np.eye(3)["xyz".index(axis)])
+        expected = part.stress_stiffness(moved)
         worst = max(worst, abs(found - expected).max() / abs(expected).max())
         count += 1
     return worst, count
+
+
+def of_elements(part, folder):
+    """Function that yields the loads along the columns of `axes`: the name in the flex-body file, and K_geo by nodes of element code."""
+    responses = Responses(part, folder)
+
+    def loads(axes):
+        for a, b in SPIN:
+            yield f"spin_{'xyz'[a]}{'xyz'[b]}", part.by_nodes(responses.to_spin(a, b, axes))
+        for interface in part.ends:
+            for kind in ("force", "moment"):
+                for k in range(3):
+                    yield f"{kind}_{'xyz'[k]}_{interface}", part.by_nodes(responses.to_interface(interface, kind, axes[:, k]))
+
+    return loads

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Geometric stiffness from the stresses of CalculiX beside element code, and a blade under spin beside CalculiX: writes evidence/pages/geometric_stiffness.md.
+"""Geometric stiffness from the stresses of CalculiX and from the deck beside element code, a blade under spin beside CalculiX, struts, beams and
+discs beside their equations: writes evidence/pages/geometric_stiffness.md.
 
     apt install calculix-ccx; pip install numpy scipy h5py
     cargo build --release --locked
@@ -20,7 +21,8 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from geometric_elements import SPIN, Part, by_element_code, full, given, run, with_stresses
+from geometric_closed_forms import BEAM, DISC, STRUT, Body, rotating_beam, rotating_disc, struts
+from geometric_elements import Part, by_element_code, full, given, of_elements, run, with_stresses
 
 ROOT = Path(__file__).resolve().parents[2]
 KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
@@ -41,6 +43,44 @@ A twisted block with two interfaces, 18 loads: six products of spin rates, force
 |---|---|---|---|---|
 """
 
+DECK = """
+## From the deck
+
+The same parts: 6 modes of `flexbody convert model.toml --geometric-stiffness spin,interfaces`, which takes the elements of the deck, beside the steps with CalculiX and the element code. The difference is that of any entry of K_geo in
+these modes, relative to the largest entry of its load. C3D10 has 4 points in all three.
+
+| elements | attitude and units | from the deck less CalculiX | CalculiX less element code | from the deck less element code |
+|---|---|---|---|---|
+"""
+BUCKLING = """
+## Buckling of a strut
+
+A strut of 30 x 2 x 2 C3D20, {size} mm, without lateral contraction, under opposite forces at its ends that keep their directions. Body: K of element code with 17 digits, and K_geo of the forces along x at both ends; the critical force is the lowest at which
+K_ff and K_geo, with the supports and, if both ends are pinned, the rotation of `/rotated_stiffness`, are singular. Pinned: 24 free modes with residual vectors of the interfaces; otherwise 24 modes of Craig-Bampton with the frame on the root. Beam: energies
+E I t'^2 + k G A (w' - t)^2 (Timoshenko, k = 5/6) less F (w'^2 + t'^2 I / A), by Rayleigh and Ritz with polynomials. Euler: pi^2 E I / L^2 and its multiples, without shear.
+
+| supports | bends along | body, N | beam, N | body less beam | body less Euler |
+|---|---|---|---|---|---|
+"""
+ROTATING_BEAM = """
+## Rotating beams
+
+A beam of 30 x 2 x 2 C3D20, {size} mm, without lateral contraction, held at its root on a hub, at a rate about the axis of its thin side. Body: 30 modes of Craig-Bampton with the frame on the root. Beam: Timoshenko's with the
+centrifugal force, by Rayleigh and Ritz with polynomials; Southwell's stiffening follows from it. Frequencies and rates are in sqrt(E I / (rho A L^4)) of the bending out of the plane; no gyroscopic terms. Wright and others (1982) have tables of such
+beams; no value is taken from them.
+
+| hub radius over length | rate | out of the plane 1, body | less beam | 2 | less beam | 3 | less beam | in the plane 1 | less beam | 2 | less beam |
+|---|---|---|---|---|---|---|---|---|---|---|---|
+"""
+ROTATING_DISC = """
+## A rotating disc
+
+A disc of 12 x 32 x 1 C3D20R, {size} mm (inner radius, outer radius, thickness), held at its inner edge, in the rotating frame. Body: 100 modes of Craig-Bampton with the frame on the inner edge. Plate: Kirchhoff's with the plane stress of the spin in closed form, by Rayleigh and
+Ritz with polynomials. Lower bound, by Rayleigh's principle: the root of the sum of the squares of the frequencies of the plate at rest and of the spinning membrane without bending stiffness, the two parts that Lamb and Southwell (1921) divide the problem into.
+
+| rate over the first frequency at rest | nodal diameters | first, body, Hz | less plate | second, body, Hz | less plate | lower bound of the first, Hz |
+|---|---|---|---|---|---|---|
+"""
 
 def turned():
     """A rotation about no axis of the model."""
@@ -73,7 +113,29 @@ def rows_of_kinds(flexbody, ccx, folder):
             # The program accepts every load, and the geometric stiffness is that of its files.
             told = run(flexbody, "convert", "stressed.toml", "--modes", 6, "--lumped", "none", "-o", "body.flex.h5", cwd=place)
             assert "FB451" in told and "FB442" not in told, told
-            yield kind, name, len(part.ids), count, worst
+            run(flexbody, "convert", "model.toml", "--geometric-stiffness", "spin,interfaces", "--modes", 6, "--lumped", "none", "-o", "deck.flex.h5", cwd=place)
+            yield kind, name, len(part.ids), count, worst, *from_the_deck(part, place)
+
+
+def from_the_deck(part, folder):
+    """Largest differences of K_geo in the modes, relative to the largest entry of each load: of deck.flex.h5 from body.flex.h5, and of
+    both from element code."""
+    loads, matrices = of_elements(part, folder), []
+    for name in ("body", "deck"):
+        with h5py.File(folder / f"{name}.flex.h5") as file:
+            own = {load: group["stiffness"][()] for load, group in file["geometric_stiffness"].items()}
+            modes = file["modes/shape"][()]
+            axes = file["frame/axes"][()]
+        assert own.keys() == {name for name, _ in loads(axes)}
+        matrices.append((own, modes, axes))
+    (recipe, modes, axes), (deck, same, _) = matrices
+    assert (modes == same).all()
+    worst = np.zeros(3)
+    for name, by_nodes in loads(axes):
+        expected = np.einsum("ink,nm,jmk->ij", modes, by_nodes.toarray(), modes, optimize=True)
+        for at, (found, wanted) in enumerate(((deck[name], recipe[name]), (recipe[name], expected), (deck[name], expected))):
+            worst[at] = max(worst[at], abs(found - wanted).max() / abs(expected).max())
+    return worst
 
 
 class Blade:
@@ -132,23 +194,8 @@ class Blade:
 
     def body(self, stiffened=True):
         """Frequencies of the body on its rotor: K_ff with the geometric stiffness of spin and reaction, less W2 (theory 7.1 and 7.6)."""
-        with h5py.File(self.folder / "body.flex.h5") as file:
-            stiffness, w2, modal_mass, inertia, c, mass = (
-                file["invariants"][name][()] for name in ("modal_stiffness", "W2", "modal_mass", "I0", "first_moment", "mass")
-            )
-            origin, axes = file["frame/origin"][()], file["frame/axes"][()]
-            matrices = {name: group["stiffness"][()] for name, group in file["geometric_stiffness"].items()}
-        nf, w = len(stiffness), axes.T @ (self.rate * self.axis)
-        a = np.cross(w, np.cross(w, axes.T @ origin))
-        force = mass * a + np.cross(w, np.cross(w, c))
-        moment = np.cross(c, a) + np.cross(w, inertia @ w)
-        stiffness = stiffness - sum(w[k] * w[l] * w2[k * nf : (k + 1) * nf, l * nf : (l + 1) * nf] for k in range(3) for l in range(3))
-        if stiffened:
-            for k, l in SPIN:
-                stiffness = stiffness + w[k] * w[l] * matrices[f"spin_{'xyz'[k]}{'xyz'[l]}"]
-            for k in range(3):
-                stiffness = stiffness + force[k] * matrices[f"force_{'xyz'[k]}_root"] + moment[k] * matrices[f"moment_{'xyz'[k]}_root"]
-        return frequencies(stiffness, modal_mass)
+        body = Body(self.folder / "body.flex.h5")
+        return frequencies(body.spinning(self.rate * self.axis, stiffened=stiffened), body.modal_mass)
 
     def compliance(self, body):
         """Deflection of the tip along the rotor axis under a unit force there, on the spinning blade: by simulate, from static equilibrium."""
@@ -263,9 +310,11 @@ def main():
 
 
 def page(flexbody, ccx, folder):
-    out = HEAD
-    for kind, name, nodes, count, worst in rows_of_kinds(flexbody, ccx, folder):
+    out, reduced = HEAD, ""
+    for kind, name, nodes, count, worst, beside, recipe, deck in rows_of_kinds(flexbody, ccx, folder):
         out += f"| {kind} | {name} | {nodes} | {count} | {worst:.1e} |\n"
+        reduced += f"| {kind} | {name} | {beside:.1e} | {recipe:.1e} | {deck:.1e} |\n"
+    out += DECK + reduced
     built = Blade(flexbody, ccx, folder / "blade")
     theirs, nodal = built.spinning(), built.all_nodes()
     body, without = built.body(), built.body(stiffened=False)
@@ -303,6 +352,23 @@ A free plate of C3D20, {1000 * Plate.SIZE[0]:.0f} x {1000 * Plate.SIZE[1]:.0f} x
     (loaded, plain), theirs = plate.body(), plate.calculix()
     for mode in range(MODES):
         out += f"| {mode + 1} | {plain[mode]:.2f} | {theirs[mode]:.2f} | {loaded[mode]:.2f} | {100 * (loaded[mode] / theirs[mode] - 1):+.3f} % |\n"
+    return out + closed_forms(flexbody, ccx, folder)
+
+
+def closed_forms(flexbody, ccx, folder):
+    """Sections of parts with equations of their own."""
+    size = lambda lengths: " x ".join(f"{1000 * length:g}" for length in lengths)
+    out = BUCKLING.format(size=size(STRUT))
+    for plane, name, body, beam, euler in struts(flexbody, ccx, folder / "strut"):
+        out += f"| {name} | {plane} | {body:.1f} | {beam:.1f} | {body / beam - 1:+.1e} | {body / euler - 1:+.1e} |\n"
+    out += ROTATING_BEAM.format(size=size(BEAM))
+    for hub, rate, *found in rotating_beam(flexbody, ccx, folder / "beam"):
+        pairs = [f"{body:.4f} | {body / beam - 1:+.1e}" for bodies, beams in (found[:2], found[2:]) for body, beam in zip(bodies, beams)]
+        out += f"| {hub:g} | {rate:g} | {' | '.join(pairs)} |\n"
+    out += ROTATING_DISC.format(size=size(DISC))
+    for rate, diameters, body, plate, least in rotating_disc(flexbody, ccx, folder / "disc"):
+        pairs = [f"{value:.2f} | {value / beside - 1:+.1e}" for value, beside in zip(body, plate)]
+        out += f"| {rate:g} | {diameters} | {' | '.join(pairs)} | {least:.2f} |\n"
     return out
 
 
