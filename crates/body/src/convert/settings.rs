@@ -4,8 +4,10 @@ use super::StressLoads;
 use crate::basis::{BasisChoice, Loads, ModeSettings};
 use crate::invariants::{FrameChoice, LumpedScheme};
 use flexbody_eigen::Wanted;
+use flexbody_elements::ProvedElements;
 use flexbody_linalg::instruction_set;
 use flexbody_model::{Damping, FeModel, SurfaceMesh};
+use std::collections::BTreeMap;
 
 /// Kind of lumped comparator.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,6 +104,8 @@ impl ConvertSettings {
         }
         if !self.stress_stiffness.is_empty() {
             described["stress_stiffness"] = serde_json::json!(self.stress_stiffness.names());
+            described["elements"] =
+                model.proved_elements().map_or(serde_json::Value::Null, |elements| counts(&elements));
         }
         // The file itself shows if there is a surface.
         if let (MeshChoice::AtMost(most), Some(_)) = (self.mesh, model.mesh()) {
@@ -119,6 +123,16 @@ impl ConvertSettings {
             MeshChoice::Without => None,
         }
     }
+}
+
+/// Returns the number of elements of each type with their formulation.
+fn counts(elements: &ProvedElements) -> serde_json::Value {
+    let mut counts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for (group, formulation) in elements.groups() {
+        *counts.entry((&group.kind, formulation.name())).or_default() += group.ids.len();
+    }
+    let one = |((kind, formulation), count): (&(&str, &str), &usize)| serde_json::json!({ "type": kind, "formulation": formulation, "count": count });
+    counts.iter().map(one).collect()
 }
 
 /// Returns the numbers that define a damping; null for a matrix.

@@ -156,7 +156,9 @@ impl Pairs {
             let response =
                 accurate_static_responses(&CoupledModel::uncoupled(model), loads.clone(), first, context)?;
             for (c, of_load) in densities.iter_mut().enumerate() {
-                for (density, pair) in of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| self.bends(pair)) {
+                for (density, pair) in
+                    of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| self.bends(pair))
+                {
                     *density = pair.axial * pair.elongation(&response, d, c);
                 }
             }
@@ -165,7 +167,9 @@ impl Pairs {
         if self.turns.contains(&false) {
             let Some(moved) = self.truss(&balanced, &densities) else { return Ok(None) };
             for (c, of_load) in densities.iter_mut().enumerate() {
-                for (density, pair) in of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| !self.bends(pair)) {
+                for (density, pair) in
+                    of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| !self.bends(pair))
+                {
                     *density = pair.weight * pair.elongation(&moved, d, c);
                 }
             }
@@ -178,10 +182,16 @@ impl Pairs {
     fn truss(&self, loads: &Mat<f64>, densities: &[Vec<f64>]) -> Option<Mat<f64>> {
         let (n, d) = (self.nodes, self.dimension);
         let mut forces =
-            Mat::from_fn(d * n, loads.ncols(), |row, c| if self.turns[row / d] { 0.0 } else { loads[(row, c)] });
+            Mat::from_fn(
+                d * n,
+                loads.ncols(),
+                |row, c| if self.turns[row / d] { 0.0 } else { loads[(row, c)] },
+            );
         for (c, of_load) in densities.iter().enumerate() {
             for (density, pair) in of_load.iter().zip(&self.pairs) {
-                for (node, sign) in pair.nodes.into_iter().zip([1.0, -1.0]).filter(|(node, _)| !self.turns[*node]) {
+                for (node, sign) in
+                    pair.nodes.into_iter().zip([1.0, -1.0]).filter(|(node, _)| !self.turns[*node])
+                {
                     (0..d).for_each(|k| forces[(d * node + k, c)] -= sign * density * pair.apart[k]);
                 }
             }
@@ -243,7 +253,8 @@ fn blocks_of(stiffness: &SymmetricMatrix, n: usize, d: usize, a: usize) -> Vec<(
     let mut entries: Vec<(usize, usize, f64)> = Vec::new();
     for i in 0..d {
         let (columns, values) = stiffness.row(d * a + i);
-        for (&column, &value) in columns.iter().zip(values).filter(|(column, _)| (**column as usize) < d * n) {
+        for (&column, &value) in columns.iter().zip(values).filter(|(column, _)| (**column as usize) < d * n)
+        {
             entries.push((column as usize / d, 3 * i + column as usize % d, value));
         }
     }

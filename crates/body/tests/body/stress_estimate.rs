@@ -82,7 +82,8 @@ fn the_estimate_is_close_to_the_stress_of_elements() {
         let known = converted(given, BodyFrame::Com);
         assert!(known.estimated_stiffness().is_empty(), "{name}: nothing is missing");
         for axis in [Vector3::x(), Vector3::y(), Vector3::z(), Vector3::new(0.6, 0.0, 0.8)] {
-            let (part, known) = (estimated.missing_part(&axis, true).expect("missing"), true_part(&known, &axis));
+            let (part, known) =
+                (estimated.missing_part(&axis, true).expect("missing"), true_part(&known, &axis));
             let ratio = part / known;
             assert!(ratio < MAX_RATIO && ratio > 1.0 / MAX_RATIO, "{name}, {axis:?}: {part:e} for {known:e}");
         }

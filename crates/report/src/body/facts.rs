@@ -2,7 +2,9 @@
 
 use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
-use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz, stress_hz};
+use super::geometric_stiffness::{
+    GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz, stress_hz, stress_stiffness_in_words,
+};
 use super::held::HeldFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::named_loads::NamedLoadFacts;
@@ -245,6 +247,9 @@ pub(super) struct ModeFacts {
     /// Spin about each axis of the model at which the centrifugal term takes 1 % of the stiffness of a
     /// motion; `None` without W2 or with geometric stiffness for spin. Unit: Hz.
     pub softening_hz: Option<[Option<f64>; 3]>,
+    /// Origin of stress stiffness that was computed from elements, in words; `None` without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stress_stiffness: Option<String>,
     /// Spin about each axis of the model at which the stress stiffness that the body does not have changes 1 % of the
     /// stiffness of a motion, by its estimate; `None` if nothing is missing. Unit: Hz.
     pub stress_hz: Option<[Option<f64>; 3]>,
@@ -346,6 +351,7 @@ impl<'b> Facts<'b> {
                 geometric_stiffness: GeometricStiffnessFacts::of(body),
                 inertia_stiffness: InertiaStiffnessFacts::of(body),
                 softening_hz: softening_hz(body),
+                stress_stiffness: stress_stiffness_in_words(body),
                 stress_hz: stress_hz(body),
                 worst_residual: worst_residual(body),
                 craig_bampton: CraigBamptonFacts::of(body),

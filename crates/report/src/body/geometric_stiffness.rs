@@ -75,6 +75,21 @@ impl InertiaStiffnessFacts {
     }
 }
 
+/// Returns the origin of stress stiffness that was computed from elements: `spin, interfaces, from 50 elements that K proves:
+/// C3D20 (20 nodes, 3 x 3 x 3 points)`; `None` without any.
+pub(super) fn stress_stiffness_in_words(body: &FlexBody) -> Option<String> {
+    let settings = &body.source().settings;
+    let loads: Vec<&str> =
+        settings["stress_stiffness"].as_array()?.iter().filter_map(serde_json::Value::as_str).collect();
+    let elements = settings["elements"].as_array()?;
+    let count: u64 = elements.iter().filter_map(|one| one["count"].as_u64()).sum();
+    let kind = |one: &serde_json::Value| {
+        Some(format!("{} ({})", one["type"].as_str()?, one["formulation"].as_str()?))
+    };
+    let kinds: Vec<String> = elements.iter().filter_map(kind).collect();
+    Some(format!("{}, from {count} elements that K proves: {}", loads.join(", "), kinds.join(", ")))
+}
+
 /// Returns the spin about each axis of the model at which the centrifugal term takes 1 % of the stiffness of
 /// the motion that it softens most. Unit: Hz. Returns `None` for a body with geometric stiffness for spin or
 /// without W2. An axis has no value if no mode moves perpendicular to it, or if a plane body does not spin

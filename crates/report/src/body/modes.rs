@@ -185,6 +185,10 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
         let words = missing_in_words(modes.softening_hz.as_ref(), hertz);
         Term::new(word_as("geometric stiffness", "Spin"), words).short("spin")
     }));
+    let stressed = modes.stress_stiffness.as_ref();
+    items.extend(stressed.map(|own| {
+        Term::new(word_as("geometric stiffness", "Stress stiffness"), own.as_str()).short("stress K")
+    }));
     let decided: Vec<_> = facts.terms.iter().filter(|term| !term.kept || term.decision.is_some()).collect();
     items.extend(decided.iter().map(|term| Term::page("Kinetic energy", term.in_words())));
     items.extend(listed("terms", &decided, |term| term.in_words()));

@@ -133,6 +133,7 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     );
     let missing = modes.stress_hz.as_ref().map(|hz| missing_in_words(modes.softening_hz.as_ref(), hz));
     items.extend(missing.map(|words| entry(Tone::Plain, "spin", words, 2)));
+    items.extend(modes.stress_stiffness.as_ref().map(|own| entry(Tone::Good, "stress K", own.as_str(), 3)));
     let dropped: Vec<_> = facts.terms.iter().filter(|term| !term.kept).collect();
     items.extend(listed_to(MAX_LISTED, "left out", &dropped, |term| {
         entry(Tone::Warning, "left out", term.in_words(), 3)
