@@ -26,7 +26,8 @@ use flexbody_body::flex_body::{MassStructure, ReferenceConditions, Storage};
 use flexbody_model::NodeMoments;
 use interfaces::{COORDINATES, INTERFACES};
 use invariants::{
-    COMPARISON, DAMPING, ESTIMATED_STIFFNESS, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED, ROTATED_STIFFNESS,
+    COMPARISON, DAMPING, ESTIMATED_STIFFNESS, GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS, INVARIANTS, LUMPED,
+    ROTATED_STIFFNESS,
 };
 use nalgebra::{Matrix3, Vector3};
 use named_load::NAMED_LOAD;

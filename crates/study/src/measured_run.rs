@@ -8,8 +8,8 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
-    FramedScene, Measure, MotionHistory, OtherModes, OutputErrors, Scene, StressError, Tolerance, Trace, trace,
-    trace_at,
+    FramedScene, Measure, MotionHistory, OtherModes, OutputErrors, Scene, StressError, Tolerance, Trace,
+    trace, trace_at,
 };
 
 /// Errors of a run of another program relative to a reference motion.
@@ -77,8 +77,7 @@ pub fn measured_run(
     let own = Trace::of_history(body, scene, &history, &motion)?;
     let framed_whole = FramedScene::new(whole, scene)?;
     let framed_body = FramedScene::new(body, scene)?.body;
-    let stress_error =
-        StressError::of_trace(&framed_whole.body, &framed_whole.scene, &continuous, context)?;
+    let stress_error = StressError::of_trace(&framed_whole.body, &framed_whole.scene, &continuous, context)?;
     diagnostics.extend(stress_error.as_ref().and_then(|own| own.warning(whole)));
     let measure = Measure::new(&framed_whole.body, &framed_whole.scene, &motion);
     let errors = match &shared {

@@ -26,7 +26,8 @@ impl FlexBody {
     ///
     /// * `uses_given`: true if the motion uses the geometric stiffness of the body; otherwise that of spin is left out too.
     pub fn missing_stiffness(&self, uses_given: bool) -> Vec<GeometricStiffness<Mat<f64>>> {
-        let is_left_out = |one: &&GeometricStiffness<Mat<f64>>| !uses_given && one.load.kind == LoadKind::Spin;
+        let is_left_out =
+            |one: &&GeometricStiffness<Mat<f64>>| !uses_given && one.load.kind == LoadKind::Spin;
         let given = self.geometric_stiffness().iter().filter(is_left_out);
         let known: Vec<_> = self.estimated_stiffness().iter().chain(given).cloned().collect();
         if !known.is_empty() || self.has_spin_stiffness() {

@@ -181,12 +181,24 @@ pub(super) const ESTIMATED_STIFFNESS: &[Item] = &[
         field!(load: matrix),
     )
     .within(13),
-    attribute("kind", Text, ONE, "`spin` (K_geo = sum of w_k w_l times the six)", written(|v| text(v.unit_load()?.kind.name())))
-        .derived("")
-        .within(13),
-    attribute("axis", Text, ONE, "body axes `xx`, `yy`, `zz`, `xy`, `yz`, `xz`", written(|v| text(v.unit_load()?.axis())))
-        .derived("")
-        .within(13),
+    attribute(
+        "kind",
+        Text,
+        ONE,
+        "`spin` (K_geo = sum of w_k w_l times the six)",
+        written(|v| text(v.unit_load()?.kind.name())),
+    )
+    .derived("")
+    .within(13),
+    attribute(
+        "axis",
+        Text,
+        ONE,
+        "body axes `xx`, `yy`, `zz`, `xy`, `yz`, `xz`",
+        written(|v| text(v.unit_load()?.axis())),
+    )
+    .derived("")
+    .within(13),
     attribute("load_units", Text, ONE, "unit of the load", written(load_units)).derived("").within(13),
 ];
 

@@ -11,8 +11,7 @@ use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{
-    FramedScene, Load, LoadCases, PerQuantity, Point, Scene, StressError, Tolerance, damped_once,
-    points_of,
+    FramedScene, Load, LoadCases, PerQuantity, Point, Scene, StressError, Tolerance, damped_once, points_of,
 };
 use nalgebra::Vector3;
 use std::borrow::Cow;

@@ -116,8 +116,9 @@ impl<'s> SelectionState<'s> {
         let references = self.reference_motions()?;
         let demands = self.demands;
         let all = demands.iter().zip(&references).zip(&self.stress_errors);
-        let cases: Vec<TestedCase<'_>> =
-            all.map(|((demand, motions), stress)| Self::tested_case(demand, motions, stress.as_ref())).collect();
+        let cases: Vec<TestedCase<'_>> = all
+            .map(|((demand, motions), stress)| Self::tested_case(demand, motions, stress.as_ref()))
+            .collect();
         context.phase("trials");
         let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
         let search = SelectionSearch {

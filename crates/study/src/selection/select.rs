@@ -196,7 +196,8 @@ pub fn select_judged(
         groups_of_variations,
         ..
     } = selection_state;
-    for (demand, (short_of, stress_error)) in demands.iter_mut().zip(short_of.into_iter().zip(stress_errors)) {
+    for (demand, (short_of, stress_error)) in demands.iter_mut().zip(short_of.into_iter().zip(stress_errors))
+    {
         (demand.short_of, demand.stress_error) = (short_of, stress_error);
     }
     // Decide for the model that the scene alone needs, then for what variations add to it.
@@ -234,7 +235,9 @@ pub fn select_judged(
         most_multiplications: first.scene.requirements.multiplications,
         trials,
         reference_errors: worst_reference_errors(&demands),
-        stress_error: first_largest(demands.iter().filter_map(|one| one.stress_error.clone()), |one| one.worst),
+        stress_error: first_largest(demands.iter().filter_map(|one| one.stress_error.clone()), |one| {
+            one.worst
+        }),
         diagnostics: once(diagnostics),
     })
 }
