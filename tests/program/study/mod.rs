@@ -2,6 +2,7 @@
 
 mod load_cases;
 mod measured_run;
+mod missing_stress;
 mod recommended_command;
 mod response;
 mod scene_damping;

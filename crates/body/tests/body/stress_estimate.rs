@@ -9,6 +9,7 @@ use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use oracle::beams::shaft;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Mesh, entries};
 use oracle::reference::dense_modes;
@@ -112,4 +113,42 @@ fn the_estimate_turns_with_the_model() {
         let other = back.missing_part(&axis, true).expect("missing");
         assert!((part / other - 1.0).abs() < 1e-6, "{part:e}, {other:e}");
     }
+}
+
+#[test]
+fn a_shaft_about_its_own_axis_has_centrifugal_softening_and_hardly_any_stress() {
+    // A beam turns about its axis without any stress; a solid shaft has the stress of its radius.
+    let beam = converted(shaft(12, 0.05), BodyFrame::Com);
+    let softening = beam.softening(&Vector3::x()).expect("moves");
+    assert!(softening > 0.0 && beam.missing_part(&Vector3::x(), true).expect("missing") < 1e-6 * softening);
+    let solid = Mesh::cylinder(ElementKind::Hex20, 2, 8, 0.02, 0.8);
+    let solid = converted(solid.assemble(&Material::STEEL, MassRule::Consistent).raw_model(), BodyFrame::Com);
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let length = |axis: &Vector3<f64>| -> f64 {
+        let along = solid.nodes().positions.iter().map(|x| axis.dot(&Vector3::from(*x)).abs());
+        along.fold(0.0, f64::max)
+    };
+    let long = axes.iter().find(|axis| length(axis) > 0.3).expect("a long axis");
+    let (part, softening) = (solid.missing_part(long, true).expect("missing"), solid.softening(long));
+    assert!(part < 0.03 * softening.expect("moves"), "{part:e} {softening:?}");
+}
+
+#[test]
+fn the_stress_of_a_turning_beam_has_the_effect_on_bending_that_theory_gives() {
+    let beam = converted(shaft(24, 0.02), BodyFrame::Com);
+    // Bending along the axis of the spin, z: T w'^2 with T = m w^2 (1/4 - x^2) / 2, for mass 1 and length 1.
+    let estimate = beam.estimated_stiffness();
+    let about = estimate.iter().find(|one| one.load.component == 2).expect("spin zz");
+    let s = beam.invariants().s().expect("a solid's sums");
+    let mode = (0..beam.n_modes()).find(|&j| s[2][2][(j, j)] > 0.9).expect("bends along z");
+    let k = 4.730_040_744_862_704f64;
+    let (a, b) = ((k / 2.0).cosh(), (k / 2.0).cos());
+    let slope = |x: f64| k * ((k * x).sinh() / a - (k * x).sin() / b);
+    let value = |x: f64| (k * x).cosh() / a + (k * x).cos() / b;
+    let sum = |f: &dyn Fn(f64) -> f64| -> f64 {
+        (0..2000).map(|i| f((f64::from(i) + 0.5) / 2000.0 - 0.5)).sum::<f64>() / 2000.0
+    };
+    let expected = sum(&|x| (0.25 - x * x) / 2.0 * slope(x).powi(2)) / sum(&|x| value(x).powi(2));
+    let own = about.matrix[(mode, mode)];
+    assert!((own / expected - 1.0).abs() < 0.03, "{own} {expected}");
 }

@@ -97,7 +97,8 @@ impl StressError {
         }
         let mut scene = framed.scene.into_owned();
         scene.requirements.damping = None;
-        match trace(body, &scene, &context.without_listener()) {
+        context.phase("stress of the spin");
+        match trace(body, &scene, context) {
             Ok((own, _)) => Self::of_trace(body, &scene, &own, context),
             Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(None),
             Err(error) => Err(error),
@@ -157,7 +158,9 @@ fn missing_part(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Option<(
     // A change of stiffness drifts by half of it times Omega_1 T (theory section 7).
     let first = body.modes().eigenvalue.first()?.sqrt();
     let drift = 0.5 * first * scene.run.duration.unwrap_or(0.0);
-    let errors = scene.requirements.tolerance.errors;
-    let smallest = errors.named().into_iter().map(|(_, allowed)| allowed).fold(f64::INFINITY, f64::min);
+    let tolerance = &scene.requirements.tolerance;
+    let attitude = if scene.prescribes() { f64::INFINITY } else { tolerance.errors.attitude };
+    let others = tolerance.errors.reaction.min(tolerance.errors.recovery).min(tolerance.of_deformation());
+    let smallest = attitude.min(others);
     (part * (1.0 + drift) > MIN_PART * smallest).then_some((part, omega))
 }

@@ -253,6 +253,9 @@ pub(super) struct ModeFacts {
     /// Spin about each axis of the model at which the stress stiffness that the body does not have changes 1 % of the
     /// stiffness of a motion, by its estimate; `None` if nothing is missing. Unit: Hz.
     pub stress_hz: Option<[Option<f64>; 3]>,
+    /// True if the body has geometric stiffness of some spins.
+    #[serde(skip)]
+    pub has_spin_stiffness: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -353,6 +356,7 @@ impl<'b> Facts<'b> {
                 softening_hz: softening_hz(body),
                 stress_stiffness: stress_stiffness_in_words(body),
                 stress_hz: stress_hz(body),
+                has_spin_stiffness: body.has_spin_stiffness(),
                 worst_residual: worst_residual(body),
                 craig_bampton: CraigBamptonFacts::of(body),
                 held: HeldFacts::of(body),

@@ -117,23 +117,45 @@ pub(super) fn stress_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
-/// Returns the spins in words, the lower one of both kinds about each axis: `no geometric stiffness: about 1 % of a stiffness
-/// is wrong at 12.5, 80.1, 79.9 Hz of rotation about x, y, z of the model (estimate)`.
-pub(super) fn missing_in_words(softening: Option<&[Option<f64>; 3]>, stress: &[Option<f64>; 3]) -> String {
-    let lower = |axis: usize| {
-        let both = [softening.and_then(|hertz| hertz[axis]), stress[axis]];
-        both.into_iter().flatten().reduce(f64::min)
+/// Ratio of the rotation that takes all of a stiffness to the one that takes 1 % of it.
+const CRITICAL_RATIO: f64 = 10.0;
+
+/// Returns the rotations in words at which 1 % of a stiffness is missing, and the critical speeds below them, where the
+/// centrifugal term takes all of a stiffness: `no geometric stiffness: about 1 % of a stiffness is missing at 12.5 Hz of
+/// rotation about z of the model (estimate); critical speed about x from 115 Hz`.
+pub(super) fn missing_in_words(
+    softening: Option<&[Option<f64>; 3]>,
+    stress: &[Option<f64>; 3],
+    is_partial: bool,
+) -> String {
+    let of_axes = |hertz: &dyn Fn(usize) -> Option<f64>| -> Vec<(&str, f64)> {
+        ["x", "y", "z"].into_iter().enumerate().filter_map(|(at, axis)| Some((axis, hertz(at)?))).collect()
     };
-    let axes = ["x", "y", "z"].into_iter().enumerate();
-    let known: Vec<(&str, f64)> = axes.filter_map(|(at, axis)| Some((axis, lower(at)?))).collect();
-    if known.is_empty() {
-        return "no rotation changes the stiffness of a motion".to_owned();
+    let told = |known: &[(&str, f64)]| {
+        let (rates, unit) = frequencies(&known.iter().map(|(_, hz)| *hz).collect::<Vec<f64>>(), 3);
+        let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
+        (format!("{} {unit}", rates.join(", ")), axes.join(", "))
+    };
+    let critical = |at: usize| softening?[at].map(|hz| CRITICAL_RATIO * hz);
+    let is_below = |at: usize, hz: f64| critical(at).is_some_and(|critical| critical < hz);
+    let missing = of_axes(&|at| stress[at].filter(|hz| !is_below(at, *hz)));
+    let critical = of_axes(&|at| critical(at).filter(|_| stress[at].is_none_or(|hz| is_below(at, hz))));
+    let mut parts = Vec::new();
+    if !missing.is_empty() {
+        let (rates, axes) = told(&missing);
+        let what =
+            if is_partial { "geometric stiffness of some spins only" } else { "no geometric stiffness" };
+        parts.push(format!(
+            "{what}: about 1 % of a stiffness is missing at {rates} of rotation about {axes} of the model (estimate)"
+        ));
     }
-    let (rates, unit) = frequencies(&known.iter().map(|(_, hz)| *hz).collect::<Vec<f64>>(), 3);
-    let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
-    format!(
-        "no geometric stiffness: about 1 % of a stiffness is wrong at {} {unit} of rotation about {} of the model (estimate)",
-        rates.join(", "),
-        axes.join(", ")
-    )
+    if !critical.is_empty() {
+        let (rates, axes) = told(&critical);
+        parts.push(format!("critical speed about {axes} from {rates}"));
+    }
+    if parts.is_empty() {
+        "no rotation changes the stiffness of a motion".to_owned()
+    } else {
+        parts.join("; ")
+    }
 }

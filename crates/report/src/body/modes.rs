@@ -182,7 +182,7 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
     let inertia = modes.inertia_stiffness.as_ref();
     items.extend(inertia.map(|own| Term::new("Stiffness of inertia", own.in_words()).short("inertia K")));
     items.extend(modes.stress_hz.as_ref().map(|hertz| {
-        let words = missing_in_words(modes.softening_hz.as_ref(), hertz);
+        let words = missing_in_words(modes.softening_hz.as_ref(), hertz, modes.has_spin_stiffness);
         Term::new(word_as("geometric stiffness", "Spin"), words).short("spin")
     }));
     let stressed = modes.stress_stiffness.as_ref();

@@ -131,7 +131,10 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(
         modes.inertia_stiffness.as_ref().map(|own| entry(Tone::Plain, "inertia K", own.in_words(), 3)),
     );
-    let missing = modes.stress_hz.as_ref().map(|hz| missing_in_words(modes.softening_hz.as_ref(), hz));
+    let missing = modes
+        .stress_hz
+        .as_ref()
+        .map(|hz| missing_in_words(modes.softening_hz.as_ref(), hz, modes.has_spin_stiffness));
     items.extend(missing.map(|words| entry(Tone::Plain, "spin", words, 2)));
     items.extend(modes.stress_stiffness.as_ref().map(|own| entry(Tone::Good, "stress K", own.as_str(), 3)));
     let dropped: Vec<_> = facts.terms.iter().filter(|term| !term.kept).collect();

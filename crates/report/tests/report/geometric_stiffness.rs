@@ -396,12 +396,22 @@ fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_w
         let hertz = json["modes"]["softening_hz"][axis].as_f64().expect("a number");
         assert!((hertz * std::f64::consts::TAU / rate - 1.0).abs() < 1e-14);
     }
-    assert!(told(&done.body, Format::Text).contains("spin        no geometric stiffness: 1 % softer at"));
+    let text = told(&done.body, Format::Text);
+    assert!(
+        text.contains("spin        no geometric stiffness: about 1 % of a stiffness is missing at"),
+        "{text}"
+    );
+    for axis in 0..3 {
+        let hertz = json["modes"]["stress_hz"][axis].as_f64().expect("a number");
+        let rate = done.body.missing_rate(axis).expect("moves");
+        assert!((hertz * std::f64::consts::TAU / rate - 1.0).abs() < 1e-14);
+    }
 
     let stiffened = run(case.raw(case.spin()), BodyFrame::Principal, centrifugal()).expect("a sound body");
     assert!(stiffened.diagnostics.iter().all(|d| d.code() != Code::GeometricStiffnessNone));
     let json: serde_json::Value = serde_json::from_str(&told(&stiffened.body, Format::Json)).expect("JSON");
     assert!(json["modes"]["softening_hz"].is_null());
+    assert!(json["modes"]["stress_hz"].is_null());
     let alone = run(case.raw(Vec::new()), BodyFrame::Principal, BasisChoice::default()).expect("sound");
     assert!(alone.diagnostics.iter().all(|d| d.code() != Code::GeometricStiffnessNone));
 }

@@ -251,7 +251,9 @@ fn a_selected_body_keeps_the_limit() {
         for static_columns in [true, false] {
             let scene = pulled(&whole, moving, 0.4, RecoveryLimit::Relative(0.01), static_columns);
             let selection = selected(&whole, &scene);
-            assert!(selection.holds(), "{moving:?}: {:?}", selection.chosen);
+            // A free body turns so fast that the stress of the spin, which this body does not have, decides the verdict.
+            let chosen = selection.chosen.as_ref().expect("measured");
+            assert!(chosen.passed(), "{moving:?}: {chosen:?}");
             let groups = selection.groups;
             let own = whole.reduced(&selection.modes, groups, selection.terms.clone()).expect("a body");
             let [apart, largest] = plainly(&motions(&whole, &own, &scene), static_columns);
