@@ -4,7 +4,7 @@
 #   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/reference/codes.md, docs/reference/file_format.md, schemas,
 #                                      the types of the Python package (_flexbody.pyi)
 #   ./scripts/make.sh pages [NAME]     pages of evidence/ (its README has the times), docs/reference/python.md and pictures; without NAME all of them (many hours). NAME:
-#                                      accuracy, craig_bampton, cutoff, dynamics, embedded, geometric_stiffness, peers, performance, plausibility, python, recovery, seeds, stability,
+#                                      accuracy, craig_bampton, cutoff, dynamics, element_proof, embedded, geometric_stiffness, peers, performance, plausibility, python, recovery, seeds, stability,
 #                                      trade, verdicts [SEEDS], image_response, image_simulation, image_terminal, image_tutorial, image_view, image_vtk
 #   ./scripts/make.sh fixtures NAME    fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py; its head says what it needs)
 #   ./scripts/make.sh site             the documentation as a site
