@@ -15,8 +15,10 @@ def rows(flexbody, folder):
     ccx = program("ccx", "CCX", "Debian's calculix-ccx")
     version = "CalculiX " + subprocess.run([ccx, "-v"], capture_output=True, text=True).stdout.split()[-1]
     found = []
-    for kind, name, _, count, worst in page.rows_of_kinds(flexbody, ccx, folder):
+    for kind, name, _, count, worst, beside, _, deck in page.rows_of_kinds(flexbody, ccx, folder):
         found.append(Row(version, kind, f"geometric stiffness of {count} loads beside element code, {name}", worst, 1e-6))
+        found.append(Row(version, kind, f"geometric stiffness from the deck beside that of stresses, {name}", float(beside), 1e-6))
+        found.append(Row(version, kind, f"geometric stiffness from the deck beside element code, {name}", float(deck), 1e-9))
     for trap, is_taken in traps(flexbody, ccx, folder / "C3D8_m").items():
         found.append(Row(version, "C3D8", f"matrix of {trap} is taken (1: yes)", float(is_taken), 0.0))
     blade = page.Blade(flexbody, ccx, folder / "blade")
