@@ -118,15 +118,13 @@ pub(crate) fn check_body(mut body: Assembled, mut found: Vec<Diagnostic>) -> Res
         && model.followers().is_none_or(|points| !points.are_all());
     found.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
-    let asked = model.take_nodal_stresses();
-    if let Err(error) = model.add_nodal_stresses(&asked) {
-        found.extend(error.into_diagnostics());
-        stop_on_error(&mut found)?;
-    }
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
     check_stresses(&model, density, allowed, &mut found);
     note_stress_points(&model, &mut found);
     stop_on_error(&mut found)?;
+    // Stresses of elements that K proves need no comparison with K.
+    let asked = model.take_nodal_stresses();
+    model.add_nodal_stresses(&asked).map_err(|error| error.after(std::mem::take(&mut found)))?;
     // Compute the fingerprints now, so that the files need not stay open.
     model.find_sources()?;
     Ok(CheckedModel { model, diagnostics: found, plausibility })

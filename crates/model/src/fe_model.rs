@@ -6,6 +6,7 @@ pub(crate) mod drilling;
 pub(crate) mod element_around;
 pub(crate) mod inertial_rows;
 pub(crate) mod layout;
+pub(crate) mod nodal_stress;
 pub(crate) mod origin;
 pub(crate) mod proved_elements;
 pub(crate) mod raw;

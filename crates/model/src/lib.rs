@@ -48,7 +48,7 @@ pub use model_data::ModelData;
 pub use named_load::ModelLoad;
 pub use nodes::{DofLabel, ElementShape, Elements, Nodes};
 pub use raw_matrix::RawMatrix;
-pub use recovery::nodal_stress::{NodalStress, StressNodes};
+pub use recovery::stress_nodes::{NodalStress, StressNodes};
 pub use recovery::stress_points::{StressPoint, pascals};
 pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
 pub use rows::given_rows::{GivenRows, LostRow, NodeAxes, RowMap};

@@ -1,7 +1,7 @@
 //! Recovery: rows that read stresses, strains, forces or displacements off the deformed body (theory section 12).
 
-pub(crate) mod nodal_stress;
 pub(crate) mod stress_labels;
+pub(crate) mod stress_nodes;
 pub(crate) mod stress_points;
 
 use crate::rows::{centre_and_length, rigid_count};

@@ -30,7 +30,7 @@ pub use modal_basis::{Basis, BasisKind, ModalBasis, Task, Truncation, rigid_mode
 pub use residual_vectors::{
     Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
 };
-pub(crate) use residual_vectors::{accurate_static_responses, centrifugal_loads};
+pub(crate) use residual_vectors::{centrifugal_loads, coupled_static_responses};
 pub use solved::{CountElsewhere, SolvedModes};
 
 /// Provenance of an eigenvector of the free body, in [`ModalBasis::provenance`] and in files.

@@ -66,24 +66,24 @@ pub fn free_static_responses_twice(
     Ok(both.map(|x| model.expand(&x).into_owned()))
 }
 
-/// Returns the static responses G F to all columns of `loads` (N x m), made self-equilibrated by inertia relief, to the
-/// rounding of double precision. Interfaces that the couplings of `model` keep rigid move as rigid bodies.
+/// Returns the static responses G F to all columns of `loads` (N x m), made self-equilibrated by inertia relief. Interfaces that the couplings of `model` keep rigid move as rigid bodies.
 ///
 /// * `first`: about the first flexible eigenvalue.
 ///
 /// # Errors
 /// Failures of the factorisation, and responses that are not accurate: exit code 3.
-pub(crate) fn accurate_static_responses(
+pub(crate) fn coupled_static_responses(
     model: &CoupledModel<'_>,
     loads: Mat<f64>,
     first: f64,
+    accuracy: ResponseAccuracy,
     context: &Context<'_>,
 ) -> Result<Mat<f64>> {
     let rigid = model.rigid_modes()?;
     let problem = model.problem(rigid.as_ref());
     let loads = model.restrict(loads);
     let nothing = Mat::zeros(loads.nrows(), 0);
-    let (precision, accuracy) = (Precision::Double, ResponseAccuracy::FULL);
+    let precision = Precision::Double;
     let found = static_responses(&problem, nothing.as_ref(), loads, first, precision, accuracy, context);
     let responses = found.map_err(|failure| explain(model.model(), failure))?;
     Ok(model.expand(&responses).into_owned())

@@ -10,6 +10,7 @@
 mod answered;
 mod body_modes;
 mod conversion;
+mod free_basis;
 mod lumped;
 mod modal_matrices;
 mod modal_model;
@@ -21,6 +22,7 @@ mod settings;
 mod shapes;
 mod soft_rotations;
 mod stress_estimate;
+mod stress_loads;
 mod stress_stiffness;
 
 pub use body_modes::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
@@ -33,5 +35,5 @@ pub(crate) use recovery::{BodyOfModel, Recovered};
 pub use recovery::{recovered_rows, recovery_loads};
 pub use settings::{ConvertSettings, Lumping, MeshChoice};
 pub use shapes::{RecoveryShapes, ShapeColumn, UNIFORM_STRAIN, load_shapes, recovery_shapes};
-pub use stress_stiffness::StressLoads;
+pub use stress_loads::StressLoads;
 pub(crate) use stress_stiffness::{StressedModes, stress_stiffness};

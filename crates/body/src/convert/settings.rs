@@ -1,6 +1,6 @@
 //! Settings of a conversion.
 
-use super::StressLoads;
+use super::stress_loads::StressLoads;
 use crate::basis::{BasisChoice, Loads, ModeSettings};
 use crate::invariants::{FrameChoice, LumpedScheme};
 use flexbody_eigen::Wanted;

@@ -1,7 +1,7 @@
 //! Shapes whose stresses an FE program is asked for: the modes of a body, and the static responses to loads and spin
 //! outside the modes.
 
-use super::recovery::{FreeBasis, StaticLoads};
+use super::free_basis::{FreeBasis, StaticLoads};
 use crate::flex_body::FlexBody;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};

@@ -13,10 +13,11 @@
 //! for shells the change of stiffness is 0.64 to 1.65 times the true one.
 
 use super::body_modes::reduced;
-use crate::basis::{CoupledModel, accurate_static_responses, centrifugal_loads, rigid_modes};
+use crate::basis::{CoupledModel, centrifugal_loads, coupled_static_responses, rigid_modes};
 use crate::flex_body::{Frame, along};
 use faer::Mat;
 use flexbody_base::error::Result;
+use flexbody_eigen::ResponseAccuracy;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix, combine, gram, side_by_side,
@@ -154,8 +155,13 @@ impl<'m> Pairs<'m> {
         let mut densities = vec![vec![0.0; self.pairs.len()]; loads.ncols()];
         // Pairs of nodes that resist rotation: the elongation under the static response of the body.
         if self.turns.contains(&true) {
-            let response =
-                accurate_static_responses(&CoupledModel::uncoupled(model), loads.clone(), first, context)?;
+            let response = coupled_static_responses(
+                &CoupledModel::uncoupled(model),
+                loads.clone(),
+                first,
+                ResponseAccuracy::ROUGH,
+                context,
+            )?;
             for (c, of_load) in densities.iter_mut().enumerate() {
                 for (density, pair) in
                     of_load.iter_mut().zip(&self.pairs).filter(|(_, pair)| self.bends(pair))

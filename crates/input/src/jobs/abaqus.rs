@@ -4,7 +4,7 @@
 
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
-use super::described::{DescribedRows, Program, Requested, described, nothing};
+use super::described::{DescribedRows, Program, described_of_job, nothing};
 use super::element_kinds::{family, has_internal_nodes};
 use super::job::{FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
@@ -58,7 +58,7 @@ impl JobReader for Abaqus {
         } else {
             let no_rotations = HashMap::new();
             let labels = DescribedRows::new(Program::Abaqus, &rows.labels, &no_rotations);
-            Some(described(&deck, &mesh, &labels, &Requested::default())?)
+            Some(described_of_job(&deck, &mesh, &labels))
         };
         let deck_files = deck.seen()?.into_iter();
         Ok(JobModel {

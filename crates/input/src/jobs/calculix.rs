@@ -5,7 +5,7 @@ use super::couplings::Coupling;
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
-use super::described::{DescribedRows, Program, Requested, described, nothing};
+use super::described::{DescribedRows, Program, described_of_job, nothing};
 use super::expanded::{Once, copies_in_sets, label_once};
 use super::job::{JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
@@ -81,7 +81,7 @@ impl JobReader for Calculix {
         nodes.extend(places);
         let is_expanded = has_copies || !knots.are_absent();
         let described =
-            if describe { Some(described_job(&deck, &mesh, &dofs, &rotations, is_expanded)?) } else { None };
+            if describe { Some(described_job(&deck, &mesh, &dofs, &rotations, is_expanded)) } else { None };
         let elements = mesh.drawn_by_corners();
         let sets = mesh.sets.with_copies(copies_in_sets(copies, &nodes, &dofs));
         let (ids, positions) = nodes.into_iter().unzip();
@@ -112,13 +112,13 @@ fn described_job(
     labels: &[DofLabel],
     rotations: &HashMap<i64, i64>,
     is_expanded: bool,
-) -> Diagnosed<DescribedElements> {
+) -> DescribedElements {
     if is_expanded {
         let reason = "elements that CalculiX expands into solids: shells and beams are not described";
-        return Ok(nothing(deck, reason));
+        return nothing(deck, reason);
     }
     let rows = DescribedRows::new(Program::Calculix, labels, rotations);
-    described(deck, mesh, &rows, &Requested::default())
+    described_of_job(deck, mesh, &rows)
 }
 
 /// Reads a stiffness matrix (`.sti`) and the labels of its rows (`.dof`).

@@ -12,7 +12,7 @@ pub(super) use rows::{Program, Rows as DescribedRows};
 use super::deck::{Card, Deck};
 use super::deck_mesh::{DeckMesh, PlacedScope};
 use super::deck_scope::Elements;
-use super::element_kinds::{Role, role};
+use super::element_kinds::{Role, n_nodes, role};
 use crate::element_source::is_isotropic;
 use crate::sets::{comparable, dotted};
 use constraints::constraints;
@@ -71,6 +71,18 @@ pub(super) fn described(
     described.equations = equations;
     described.not_described.extend(not_described);
     Ok(with_internal_nodes(described, rows, |node| mesh.nodes.contains_key(&node)))
+}
+
+/// Describes the elements of the deck of a job, whose matrices are sound without them: a card that cannot be read is a reason
+/// why nothing is described.
+pub(super) fn described_of_job(deck: &Deck, mesh: &DeckMesh, rows: &Rows<'_>) -> DescribedElements {
+    described(deck, mesh, rows, &Requested::default()).unwrap_or_else(|found| {
+        let reason = found.first().map_or("the deck cannot be read", Diagnostic::message);
+        let line = found.first().and_then(Diagnostic::line);
+        let mut described = nothing(deck, reason);
+        described.not_described.iter_mut().for_each(|part| part.line = line);
+        described
+    })
 }
 
 /// Returns the description of a deck of which nothing is described, with the reason in words.
@@ -246,7 +258,9 @@ impl<'d> Describing<'d> {
     fn solids(&mut self, scope: &PlacedScope, kind: &str, members: &[(i64, Vec<i64>)], sections: &Sections) {
         let mut groups: BTreeMap<(usize, usize), ElementGroup> = BTreeMap::new();
         for (id, nodes) in members {
-            let nodes: Vec<i64> = nodes.iter().map(|node| node + scope.shift).collect();
+            // CalculiX ignores what follows the nodes of an element on its line.
+            let count = n_nodes(kind).unwrap_or(nodes.len());
+            let nodes: Vec<i64> = nodes.iter().take(count).map(|node| node + scope.shift).collect();
             let at = sections.of_elements.get(id).copied();
             let section = match at.map(|at| &sections.all[at]) {
                 Some(Ok(section)) => section,

@@ -62,7 +62,14 @@ impl JobReader for Nastran {
         let has_other_matrices = !dmigs.names().is_empty() && bulk.has_elements;
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
         let described = if describe {
-            let mut described = described(path, &nodes, &bulk, &places, has_other_matrices)?;
+            // The matrices are sound without elements: a card that cannot be read is a reason why nothing is described.
+            let read = described(path, &nodes, &bulk, &places, has_other_matrices);
+            let mut described = read.unwrap_or_else(|found| {
+                let what = found.first().map_or(String::new(), |first| first.message().to_owned());
+                let line = found.first().and_then(Diagnostic::line);
+                let not_described = vec![NotDescribed { what, line, nodes: Vec::new() }];
+                DescribedElements { not_described, path: path.to_path_buf(), ..DescribedElements::default() }
+            });
             let (equations, not_described) = matrices.equations(&places);
             described.equations = equations;
             described.not_described.extend(not_described);

@@ -11,6 +11,10 @@ use std::sync::Arc;
 /// Help where the deck and the matrices disagree.
 const DIFFERENT: &str = "write K again with the deck as it is now, or give the deck that K was written with; what was changed in one of the two changes every stress";
 
+/// Help for elements whose volume is negative.
+const INVERTED: &str =
+    "give the nodes of each element in the order of its type, and the positions that K was written with";
+
 /// Help where the elements are not known.
 const UNKNOWN: &str = "stress and its stiffness can come from the FE program itself: `flexbody shapes`, and [[geometric_stiffness]] of the manifest";
 
@@ -70,11 +74,9 @@ fn in_words(refusal: &Refusal) -> (String, Option<usize>, &'static str) {
             (message, None, UNKNOWN)
         }
         Refusal::Degenerate { kind, ids } => {
-            let message = format!(
-                "{} are inverted, or lie on the axis of a cylindrical orientation",
-                elements(kind, ids)
-            );
-            (message, None, DIFFERENT)
+            let message =
+                format!("{}: inverted, or on the axis of a cylindrical orientation", elements(kind, ids));
+            (message, None, INVERTED)
         }
         Refusal::WithoutRow(missing) => {
             let name = |(node, direction): &NodeDirection| {
@@ -103,7 +105,7 @@ fn in_words(refusal: &Refusal) -> (String, Option<usize>, &'static str) {
         Refusal::Unexplained { entries, at, largest } => {
             let [from, to] = at.map(|(node, direction)| DofLabel { node, direction }.to_string());
             let message = format!(
-                "{entries} entries of K are not the sum of the elements around them: largest difference {} of the row sums, between {from} and {to}; an element, a spring or a constraint is missing in the deck",
+                "entries of K that are not the sum of the elements around them: {entries}; largest difference {} of the row sums, between {from} and {to}; an element, a spring or a constraint is missing in the deck",
                 significant(*largest, 3)
             );
             (message, None, DIFFERENT)

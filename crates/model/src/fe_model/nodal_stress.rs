@@ -2,45 +2,12 @@
 
 use crate::recovery::refuse_name;
 use crate::wording::name_some;
-use crate::{FeModel, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow};
+use crate::{FeModel, ModelRecovery, NodalStress, Quantity, RecoveryOperator, RecoveryRow, StressNodes};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use std::collections::HashSet;
-use std::path::PathBuf;
 
 /// Components of a stress, in the order of its rows.
 const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
-
-/// Stresses at nodes that a model asks for: means over the elements of one material around each node.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NodalStress {
-    /// Name of the recovery that they become, unique in the model.
-    pub name: String,
-    /// Nodes whose stresses are wanted.
-    pub nodes: StressNodes,
-    /// File of the nodes, for messages; empty without one.
-    pub path: PathBuf,
-}
-
-/// Nodes whose stresses are wanted.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum StressNodes {
-    /// All nodes of elements.
-    All,
-    /// Nodes on the surface.
-    Surface,
-    /// Nodes by their numbers.
-    These(Vec<i64>),
-}
-
-impl NodalStress {
-    /// Returns the stresses at those of its nodes that belong to a body; `None` if it has none of them.
-    pub(crate) fn among(&self, body: &HashSet<i64>) -> Option<Self> {
-        let StressNodes::These(nodes) = &self.nodes else { return Some(self.clone()) };
-        let own: Vec<i64> = nodes.iter().copied().filter(|node| body.contains(node)).collect();
-        (!own.is_empty()).then(|| Self { nodes: StressNodes::These(own), ..self.clone() })
-    }
-}
 
 impl FeModel {
     /// Adds a recovery for each request of stresses at nodes, after those of other operators.
@@ -70,7 +37,8 @@ impl FeModel {
             StressNodes::Surface => {
                 let Some(mesh) = self.mesh() else {
                     let message = "the surface of the model is not known";
-                    return Err(Diagnostic::new(Code::RecoveryRows, message).into());
+                    let help = "name the deck in `mesh` of [files], or ask for stresses at all nodes (nodes)";
+                    return Err(Diagnostic::new(Code::RecoveryRows, message).with_help(help).into());
                 };
                 let mut on_surface: Vec<i64> =
                     mesh.triangles().iter().flatten().map(|&node| self.nodes().ids[node as usize]).collect();
@@ -89,7 +57,8 @@ impl FeModel {
         };
         if !without.is_empty() || stresses.places.is_empty() {
             let message = format!("no element has the nodes {}", name_some(&without));
-            return Err(Diagnostic::new(Code::RecoveryRows, message).into());
+            let help = "name nodes of elements";
+            return Err(Diagnostic::new(Code::RecoveryRows, message).with_help(help).into());
         }
         let unit = self.units().stress_name();
         let place = |(at, &(node, material)): (usize, &(i64, &str))| {
