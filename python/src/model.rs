@@ -352,9 +352,17 @@ impl Model {
     /// sequence of node numbers. The assembled stiffness of the elements has to be K.
     ///
     /// Raises InputError.
-    #[pyo3(signature = (nodes: "str | Sequence[int]", *, name=String::from("stress")), text_signature = "($self, nodes, *, name=\"stress\")")]
-    fn with_stresses(&self, py: Python<'_>, nodes: &Bound<'_, PyAny>, name: String) -> PyResult<Self> {
-        let nodes = stress_nodes(nodes)?;
+    #[pyo3(
+        signature = (nodes: "str | Sequence[int]", *, name: "str" = None),
+        text_signature = "($self, nodes, *, name=\"stress\")"
+    )]
+    fn with_stresses(
+        &self,
+        py: Python<'_>,
+        nodes: &Bound<'_, PyAny>,
+        name: Option<String>,
+    ) -> PyResult<Self> {
+        let (nodes, name) = (stress_nodes(nodes)?, name.unwrap_or_else(|| "stress".to_owned()));
         let model = Arc::clone(&self.inner);
         let inner = run(py, move |_| model.with_stresses(name, nodes))?;
         Ok(Self { inner: Arc::new(inner) })

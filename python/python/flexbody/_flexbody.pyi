@@ -774,6 +774,13 @@ class Model:
     def diagnostics(self) -> tuple[Diagnostic, ...]:
         """Warnings and notes of reading and checking, as a tuple of `Diagnostic`."""
 
+    def with_stresses(self, nodes: str | Sequence[int], *, name: str = "stress") -> Model:
+        """Model with stresses at nodes as a recovery, from the elements of its deck: `nodes` is "surface", "nodes" (all), or a
+        sequence of node numbers. The assembled stiffness of the elements has to be K.
+
+        Raises InputError.
+        """
+
     def convert(
         self,
         *,
@@ -783,10 +790,14 @@ class Model:
         accuracy: _types.Accuracy = "standard",
         frame: _types.Frame = "com",
         comparators: bool = True,
+        geometric_stiffness: _types.StressLoads = "none",
         scene: _Cases | None = None,
         allow_unjudged: bool = False,
     ) -> Body:
         """Computes modes and invariants, like `flexbody.convert`.
+
+        `geometric_stiffness` names loads whose stress stiffness is computed from the elements of the deck, separated by
+        commas: "spin", "interfaces", "loads"; the assembled stiffness of the elements has to be K.
 
         With a `scene` (a `Scene`, the path of a scene file, or a list of load cases) the body has only the terms and
         modes that the scene needs; `Body.terms` gives the reasons. A selection that does not hold, or cannot be judged, is
