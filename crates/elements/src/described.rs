@@ -55,9 +55,9 @@ pub struct Section {
 /// Axes of a material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Axes {
-    /// Those of the model.
+    /// Axes of the model.
     Model,
-    /// The same everywhere: the columns, along the axes of the model.
+    /// Axes that are the same everywhere: the columns, along the axes of the model.
     Fixed(Matrix3<f64>),
     /// Radius, circumference and axis of a cylinder, about the line through two points.
     Cylinder {

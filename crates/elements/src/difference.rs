@@ -4,7 +4,7 @@ use crate::places::Place;
 use flexbody_linalg::SymmetricMatrix;
 use std::collections::BTreeMap;
 
-/// What is left of a symmetric matrix after matrices of elements are subtracted from its upper triangle.
+/// Symmetric matrix from whose upper triangle matrices of elements are subtracted.
 pub(crate) struct Difference<'k> {
     matrix: &'k SymmetricMatrix,
     /// Values left, parallel to those of the matrix; those below the diagonal are not changed.

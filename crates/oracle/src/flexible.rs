@@ -45,6 +45,18 @@ pub fn soft_block(modes: usize) -> FlexBody {
     body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), modes, BodyFrame::Principal)
 }
 
+/// Returns the body with a geometric stiffness of spin that is zero: its motion is the same, and nothing is missing in it.
+pub fn unstressed(body: FlexBody) -> FlexBody {
+    let nf = body.n_modes();
+    let zero = |&component: &usize| GeometricStiffness {
+        load: UnitLoad { kind: LoadKind::Spin, component },
+        matrix: Mat::zeros(nf, nf),
+    };
+    let geometric_stiffness = LoadKind::Spin.of_dimension(body.dimension()).iter().map(zero).collect();
+    let parts = Parts { geometric_stiffness, estimated_stiffness: Vec::new(), ..body.into_parts() };
+    FlexBody::new(parts).expect("a body")
+}
+
 /// Returns the oracle with the invariants of the body.
 pub fn oracle(body: &FlexBody) -> GeneralBody {
     let own = body.invariants();

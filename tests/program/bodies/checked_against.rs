@@ -25,7 +25,7 @@ fn run(folder: &Path, line: &str) -> (Option<i32>, String, String) {
 fn interfaces_that_the_model_does_not_state_are_those_of_the_body() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = oracle::fixtures().join("models/bracket_hex20");
-    for file in ["K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv", "model.toml"] {
+    for file in ["K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv", "model.toml", "matrices.inp.gz"] {
         fs::copy(model.join(file), folder.path().join(file)).expect("a copy");
     }
     let manifest = fs::read_to_string(model.join("model.toml")).expect("a manifest");

@@ -274,7 +274,7 @@ fn selections_for_a_carried_body_keep_all_groups_and_hold() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     let text = "gravity = [0, 0, -9.81]\n[run]\nduration = 0.5\noutputs = 50\n[damping]\nratio = 0.02\n[carried]\ninterface = \"root\"\n\
-                [carried.spin]\nrate = { to = 3, duration = 0.4 }\n[[watch]]\ninterface = \"tip\"\n";
+                [carried.spin]\nrate = { to = 0.3, duration = 0.4 }\n[[watch]]\ninterface = \"tip\"\n";
     fs::write(&path, text).expect("written");
     let scene = LoadCases::read_single(&path, None).expect("a scene");
     let selection = select(&body, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");

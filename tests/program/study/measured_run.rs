@@ -55,7 +55,9 @@ fn an_error_that_was_put_into_a_run_is_found() {
     let scene = tumble(&body);
     let exact = history(&body, &scene);
     let none = measured(&body, &scene, exact.clone());
-    assert!(none.worst < 1e-9 && none.holds(), "{none:?}");
+    assert!(none.worst < 1e-9, "{none:?}");
+    // Both runs lack the stress stiffness of the spin, so that the run is not one of the part.
+    assert!(none.stress_error.is_some() && !none.holds(), "{none:?}");
     // All deformations 1 % too large.
     let mut larger = exact.clone();
     larger.q.iter_mut().flatten().for_each(|q| *q *= 1.01);

@@ -46,13 +46,14 @@ fn nothing_holds_where_the_missing_stress_matters_and_no_alarm_is_false() {
         let scene = fixtures().join(format!("scenes/{scene}.toml"));
         let scene = scene.to_str().expect("a path");
         let (selection, passed) = json(folder.path(), &["select", "body.flex.h5", "--scene", scene]);
-        assert_eq!(selection["verdict"]["holds"], !matters, "{model}: {}", selection["verdict"]);
+        let verdict = &selection["results"]["verdict"];
+        assert_eq!(verdict["holds"], !matters, "{model}: {verdict}");
         assert_eq!(passed, !matters, "{model}");
         assert_eq!(warns(&selection), matters, "{model}");
         let (simulation, _) = json(folder.path(), &["simulate", "body.flex.h5", "--scene", scene]);
         assert_eq!(warns(&simulation), matters, "{model}");
         if matters {
-            let why = selection["verdict"]["why"].as_str().expect("a reason");
+            let why = verdict["why"].as_str().expect("a reason");
             assert!(why.contains("W2") && why.contains("not judged"), "{model}: {why}");
         }
     }
