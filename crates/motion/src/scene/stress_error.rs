@@ -116,7 +116,7 @@ impl StressError {
         1.0 - known.filter(|own| own.is_small()).map_or(0.0, |own| own.worst)
     }
 
-    /// Returns the error in words: `stress by about 48 % (tolerance 2 %)`.
+    /// Returns the error in words: `an error of about 48 % in stress (tolerance 2 %)`.
     pub fn in_words(&self) -> String {
         let (name, error, tolerance) = self.decisive;
         let size = |value: f64| match name {
@@ -124,9 +124,9 @@ impl StressError {
             _ => format!("{} %", significant(100.0 * value, 2)),
         };
         if error.is_infinite() {
-            return "the motion beyond the reach of a run".to_owned();
+            return "an error that no run can measure".to_owned();
         }
-        format!("{name} by about {} (tolerance {})", size(error), size(tolerance))
+        format!("an error of about {} in {name} (tolerance {})", size(error), size(tolerance))
     }
 
     /// Returns the warning that the result may be wrong by this error; `None` if it is small.
@@ -134,7 +134,7 @@ impl StressError {
         (!self.is_small()).then(|| {
             let source = if self.is_of_body { "" } else { " (bound 2.5 (w / Omega_1)^2, the body has no estimate)" };
             let message = format!(
-                "the body has no geometric stiffness of spin: the spin of {} rad/{} about {} changes up to {} % of the stiffness by its stress{source}, and that changes {}",
+                "the body has no geometric stiffness of spin: the spin of {} rad/{} about {} changes up to {} % of the stiffness by its stress{source}: {}",
                 significant(self.omega.norm(), 4),
                 body.units().time.name(),
                 axis_in_words(&self.omega),

@@ -190,10 +190,7 @@ fn error(selection: &Selection) -> String {
     };
     let unstressed = selection.stress_error.as_ref().filter(|own| !own.is_small());
     let unstressed = unstressed.map_or_else(String::new, |own| {
-        format!(
-            "; the stress of the spin, which the body does not have, changes {} (estimated)",
-            own.in_words()
-        )
+        format!("; the stress of the spin, which the body does not have, makes {}, estimated", own.in_words())
     });
     let reference_errors = reference_errors + &unstressed;
     match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {

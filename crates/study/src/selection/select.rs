@@ -203,11 +203,9 @@ pub fn select_judged(
     // Decide for the model that the scene alone needs, then for what variations add to it.
     let groups = choice.groups;
     choice.groups = groups.and(groups_of_variations.complement());
-    let mut decided = DecisionInput { demands: &demands, choice: &choice, trials: &trials }.decisions();
+    let decided = DecisionInput { demands: &demands, choice: &choice, trials: &trials }.decisions();
     choice.groups = groups;
-    for (term, error) in decided.iter_mut().filter(|(term, _)| groups_of_variations.has(term.group)) {
-        (*term, *error) = needed_by_variations(term.group, &varied, cases);
-    }
+    let decided = with_variations(decided, groups_of_variations, &varied, cases);
     let (terms, decisive_errors): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
     let first = &demands[0];
     Ok(Selection {
@@ -235,9 +233,7 @@ pub fn select_judged(
         most_multiplications: first.scene.requirements.multiplications,
         trials,
         reference_errors: worst_reference_errors(&demands),
-        stress_error: first_largest(demands.iter().filter_map(|one| one.stress_error.clone()), |one| {
-            one.worst
-        }),
+        stress_error: worst_stress_error(&demands),
         diagnostics: once(diagnostics),
     })
 }
@@ -299,6 +295,24 @@ pub(super) fn worst_reference_errors(demands: &[Demand<'_>]) -> Vec<ReferenceErr
     let last = |demand: &&Demand<'_>| demand.reference_errors.last().map_or(-1.0, |own| own.worst);
     let worst = first_largest(demands, |demand| last(demand));
     worst.map_or_else(Vec::new, |demand| demand.reference_errors.to_vec())
+}
+
+/// Returns the largest error of any load case by the missing stress stiffness of the spin.
+fn worst_stress_error(demands: &[Demand<'_>]) -> Option<StressError> {
+    first_largest(demands.iter().filter_map(|one| one.stress_error.clone()), |one| one.worst)
+}
+
+/// Returns the decisions with those about the groups that variations need in place of those by the scene alone.
+fn with_variations(
+    mut decided: Vec<(TermDecision, Option<DecisiveError>)>,
+    groups_of_variations: TermGroups,
+    varied: &[VariedSelection],
+    cases: &LoadCases,
+) -> Vec<(TermDecision, Option<DecisiveError>)> {
+    for (term, error) in decided.iter_mut().filter(|(term, _)| groups_of_variations.has(term.group)) {
+        (*term, *error) = needed_by_variations(term.group, varied, cases);
+    }
+    decided
 }
 
 /// Returns the decision about a group that the scene alone would drop, and the error that it then has in the worst
