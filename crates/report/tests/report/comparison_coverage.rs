@@ -223,6 +223,7 @@ fn flatten(parts: &mut Parts) {
     parts.nodes.positions.iter_mut().for_each(|x| x[2] = 0.0);
     (2..parts.modes.shape.nrows()).step_by(3).for_each(|i| parts.modes.shape.row_mut(i).fill(0.0));
     parts.inertia_stiffness = None;
+    parts.estimated_stiffness.clear();
     general(parts).plane = true;
 }
 
