@@ -30,7 +30,7 @@ const RELATIVE_SUPPORT: f64 = 1e-9;
 
 /// Displacements of nodes above which there is no estimate: the factor of the truss would take a large part of the
 /// conversion and of its memory. The bound 2.5 (w / Omega_1)^2 stands in.
-const MAX_DISPLACEMENTS: usize = 60_000;
+const MAX_DISPLACEMENTS: usize = 15_000;
 
 /// Block of K between two nodes, relative to the largest block of one of them, below which the nodes are not joined.
 const MIN_COUPLING: f64 = 1e-9;
