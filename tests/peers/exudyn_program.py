@@ -35,7 +35,7 @@ class Case:
         self.folder.mkdir()
         model = ROOT / "fixtures/models/bracket_hex20"
         text = (model / "model.toml").read_text()
-        for file in ("K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv"):
+        for file in ("K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv", "matrices.inp.gz"):
             text = text.replace(f'"{file}', f'"{model}/{file}')
         positions = np.genfromtxt(model / "nodes.csv", delimiter=",", skip_header=1)[:, 1:4]
         low, high = positions.min(axis=0) - 1, positions.max(axis=0) + 1

@@ -23,17 +23,10 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry, side_by_side};
 use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
 use nalgebra::Vector3;
-use recoveries::recovery_checks;
+use recoveries::{limit_of_responses, recovery_checks};
 
 /// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
 const MAX_RECOMPUTED_DIFFERENCE: f64 = 1e-12;
-
-/// Limit of recomputed stress stiffness, relative to the largest of its load: static responses are accurate to 1e-8, and
-/// stresses are differences of displacements.
-const MAX_STRESS_DIFFERENCE: f64 = 1e-6;
-
-/// Roundings of stored numbers that an entry of it may show: it sums products of stored modes.
-const ROUNDINGS: f64 = 100.0;
 
 /// Name of K_ff in [`primary_differences`].
 const STIFFNESS: &str = "modal_stiffness";
@@ -509,8 +502,7 @@ fn geometric_check(
         let size = stored.norm_max().max(recomputed.norm_max());
         // What is computed from elements is as accurate as the static response to the load.
         let is_given = model.geometric_stiffness().iter().any(|one| one.load.kind == load.kind);
-        let computed = MAX_STRESS_DIFFERENCE + ROUNDINGS * body.storage().rounding();
-        let rounding = if is_given { of_given } else { size * computed };
+        let rounding = if is_given { of_given } else { size * limit_of_responses(body.storage()) };
         Difference::new(largest_entry((&stored - &recomputed).as_ref()), size, rounding)
     };
     Ok(loads.map(difference).reduce(Difference::worse))

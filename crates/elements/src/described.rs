@@ -99,6 +99,18 @@ pub struct NotDescribed {
     pub nodes: Vec<i64>,
 }
 
+impl NotDescribed {
+    /// Creates the statement that some elements of a type are not described, for a reason in words.
+    ///
+    /// * `nodes`: of the elements, in any order and as often as they occur.
+    pub fn elements(kind: &str, reason: &str, count: usize, mut nodes: Vec<i64>) -> Self {
+        nodes.sort_unstable();
+        nodes.dedup();
+        let elements = if count == 1 { "element" } else { "elements" };
+        Self { what: format!("{count} {elements} of type {kind}: {reason}"), line: None, nodes }
+    }
+}
+
 impl DescribedElements {
     /// Returns the part of the description that touches some nodes: those of one of several bodies. Nodes inside elements, and
     /// nodes that follow others, belong to the elements and nodes that they are connected to.

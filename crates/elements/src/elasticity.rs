@@ -13,6 +13,16 @@ impl Elasticity {
         Self::orthotropic_constants([youngs; 3], [poisson; 3], [youngs / (2.0 * (1.0 + poisson)); 3])
     }
 
+    /// Returns the elasticity of an isotropic material by Lame's constants.
+    pub fn of_lame(lambda: f64, mu: f64) -> Self {
+        Self(Matrix6::from_fn(|i, j| match (i < 3 && j < 3, i == j) {
+            (true, true) => lambda + 2.0 * mu,
+            (true, false) => lambda,
+            (false, true) => mu,
+            (false, false) => 0.0,
+        }))
+    }
+
     /// Returns the elasticity of an orthotropic material by its engineering constants E1, E2, E3, nu12, nu13, nu23 and
     /// G12, G13, G23, where nu_ij / E_i = nu_ji / E_j; `None` unless it is positive definite.
     pub fn orthotropic_constants(youngs: [f64; 3], poisson: [f64; 3], shear: [f64; 3]) -> Option<Self> {

@@ -1,6 +1,7 @@
 //! Elements that the stiffness matrix proves: stress stiffness and stresses.
 
 use crate::places::Places;
+use crate::stress::extrapolated;
 use crate::{DescribedElements, ElementGroup, Formulation};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
@@ -166,7 +167,11 @@ impl ProvedElements {
         }
         let places: Vec<(i64, &str)> = around.keys().copied().collect();
         let corners: Vec<Vec<(usize, usize)>> = around.into_values().collect();
-        let blocks = parallel::values(corners.len(), PLACES_PER_TASK, |at| self.mean_stress(&corners[at]));
+        // The weights of the points at the nodes are those of the formulation.
+        let weights: Vec<Vec<Vec<f64>>> =
+            self.formulations.iter().map(|formulation| formulation.nodal_extrapolation()).collect();
+        let blocks =
+            parallel::values(corners.len(), PLACES_PER_TASK, |at| self.mean_stress(&corners[at], &weights));
         let entries = blocks.into_iter().enumerate().flat_map(|(at, block)| {
             let of_row = move |(row, values): (u32, [f64; 6])| {
                 values.into_iter().enumerate().map(move |(k, value)| (row, (6 * at + k) as u32, value))
@@ -179,7 +184,9 @@ impl ProvedElements {
     }
 
     /// Returns the mean stress of elements at their corners: six values for each row of the stiffness.
-    fn mean_stress(&self, corners: &[(usize, usize)]) -> BTreeMap<u32, [f64; 6]> {
+    ///
+    /// * `weights`: of the points at the nodes, for each group.
+    fn mean_stress(&self, corners: &[(usize, usize)], weights: &[Vec<Vec<f64>>]) -> BTreeMap<u32, [f64; 6]> {
         let mut sums: BTreeMap<u32, [f64; 6]> = BTreeMap::new();
         for &(at, corner) in corners {
             let member = &self.members[at];
@@ -187,18 +194,14 @@ impl ProvedElements {
             let section = &self.described.groups[member.group as usize].section;
             let rows = formulation.stress_rows(&self.positions_of(member), section);
             let rows = rows.expect("elements with a stiffness have stresses");
-            let weights = &formulation.nodal_extrapolation()[corner];
+            let stresses = extrapolated(&rows, &weights[member.group as usize][corner]);
             for (column, place) in
                 member.nodes.iter().flat_map(|node| &self.places.of_nodes[*node as usize]).enumerate()
             {
-                let stress: [f64; 6] = std::array::from_fn(|k| {
-                    let at_points =
-                        weights.iter().enumerate().map(|(p, weight)| weight * rows[6 * p + k][column]);
-                    at_points.sum::<f64>() / corners.len() as f64
-                });
+                let mean = |stress: &Vec<f64>| stress[column] / corners.len() as f64;
                 place.for_each(|row, factor| {
                     let sum = sums.entry(row).or_default();
-                    sum.iter_mut().zip(stress).for_each(|(sum, value)| *sum += factor * value);
+                    sum.iter_mut().zip(&stresses).for_each(|(sum, stress)| *sum += factor * mean(stress));
                 });
             }
         }
@@ -208,24 +211,6 @@ impl ProvedElements {
     fn positions_of(&self, member: &Member) -> Vec<[f64; 3]> {
         let count = self.formulations[member.group as usize].n_nodes();
         member.nodes[..count].iter().map(|node| self.places.positions[*node as usize]).collect()
-    }
-
-    /// Returns the Kronecker product of a matrix by nodes and I3 in the rows of the stiffness: nodes without rows follow their
-    /// equations.
-    pub fn in_rows(&self, by_nodes: &SymmetricMatrix) -> SymmetricMatrix {
-        let mut entries = Vec::with_capacity(3 * by_nodes.as_csc().nnz());
-        for a in 0..by_nodes.n() {
-            let (columns, values) = by_nodes.row(a);
-            for (&b, &value) in columns.iter().zip(values) {
-                for k in 0..3 {
-                    let (row, column) = (&self.places.of_nodes[a][k], &self.places.of_nodes[b as usize][k]);
-                    row.for_each(|i, left| {
-                        column.for_each(|j, right| entries.push((i, j, left * value * right)))
-                    });
-                }
-            }
-        }
-        SymmetricMatrix::symmetrised(CscMatrix::from_triplets(self.rows, self.rows, &entries))
     }
 }
 

@@ -4,7 +4,7 @@ use crate::elasticity::PLACES;
 use crate::formulation::{Formulation, Strain};
 use crate::geometry::{PerFunction, Point};
 use crate::shape::{HEX_CORNERS, MAX_NODES};
-use crate::{Axes, Section};
+use crate::{Axes, Elasticity, Section};
 use nalgebra::{Matrix6, Vector3};
 
 /// Factor of the hourglass stiffness in CalculiX 2.20, to which the stiffness of the hourglass modes is proportional.
@@ -154,14 +154,9 @@ fn add_hourglass(blocks: &mut Blocks, x: &[[f64; 3]], point: &Point, modulus: f6
 /// the stress xx for a unit strain xx along the axes of the model.
 fn hourglass_modulus(elasticity: &Matrix6<f64>) -> f64 {
     let (lambda, shear) = (elasticity[(0, 1)], elasticity[(3, 3)]);
-    let isotropic = Matrix6::from_fn(|i, j| match (i < 3 && j < 3, i == j) {
-        (true, true) => lambda + 2.0 * shear,
-        (true, false) => lambda,
-        (false, true) => shear,
-        (false, false) => 0.0,
-    });
+    let isotropic = Elasticity::of_lame(lambda, shear);
     let full = elasticity[(0, 0)];
-    if (elasticity - isotropic).amax() <= 1e-12 * full {
+    if (elasticity - isotropic.0).amax() <= 1e-12 * full {
         shear * (3.0 * lambda + 2.0 * shear) / (lambda + shear)
     } else {
         full

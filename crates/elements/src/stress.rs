@@ -58,20 +58,8 @@ impl Formulation {
     /// If the number of nodes is another one.
     pub fn nodal_stress_rows(self, x: &[[f64; 3]], section: &Section) -> Option<Vec<Vec<f64>>> {
         let points = self.stress_rows(x, section)?;
-        let columns = 3 * self.n_functions();
-        let mut rows = Vec::with_capacity(6 * self.n_nodes());
-        for weights in self.nodal_extrapolation() {
-            for component in 0..6 {
-                let mut row = vec![0.0; columns];
-                for (p, weight) in weights.iter().enumerate() {
-                    for (sum, value) in row.iter_mut().zip(&points[6 * p + component]) {
-                        *sum += weight * value;
-                    }
-                }
-                rows.push(row);
-            }
-        }
-        Some(rows)
+        let at_nodes = self.nodal_extrapolation();
+        Some(at_nodes.iter().flat_map(|weights| extrapolated(&points, weights)).collect())
     }
 
     /// Returns the forces at nodes and internal nodes with which stresses at the points are in equilibrium: the sum over
@@ -99,6 +87,19 @@ impl Formulation {
     fn check_functions(self, count: usize) {
         assert_eq!(count, self.n_functions(), "displacements of an element: {}", self.name());
     }
+}
+
+/// Returns the six rows of the stress at a node, for the rows at the points and the weights of the points at the node.
+pub(crate) fn extrapolated(points: &[Vec<f64>], weights: &[f64]) -> [Vec<f64>; 6] {
+    std::array::from_fn(|component| {
+        let mut row = vec![0.0; points[component].len()];
+        for (p, weight) in weights.iter().enumerate() {
+            for (sum, value) in row.iter_mut().zip(&points[6 * p + component]) {
+                *sum += weight * value;
+            }
+        }
+        row
+    })
 }
 
 impl Point {

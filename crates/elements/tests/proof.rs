@@ -206,6 +206,21 @@ fn what_differs_is_refused_by_name() {
     assert_eq!(other, [Refusal::NotDescribed(shells), unknown]);
 }
 
+/// Returns T' (g kron I3) T with the displacements T of the nodes of elements for a unit displacement of each row.
+fn in_rows(proved: &ProvedElements, by_nodes: &SymmetricMatrix, n: usize) -> SymmetricMatrix {
+    let follow = proved.displacements(Mat::<f64>::identity(n, n).as_ref());
+    let nodes = proved.n_nodes();
+    let whole = Mat::from_fn(3 * nodes, 3 * nodes, |i, j| {
+        if i % 3 == j % 3 { by_nodes.as_csc().get(i / 3, j / 3) } else { 0.0 }
+    });
+    let dense = follow.transpose() * whole * &follow;
+    let entries: Vec<(u32, u32, f64)> = (0..n)
+        .flat_map(|i| (0..n).map(move |j| (i, j)))
+        .map(|(i, j)| (i as u32, j as u32, dense[(i, j)]))
+        .collect();
+    SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &entries))
+}
+
 #[test]
 fn stress_stiffness_turns_the_load_and_stresses_are_those_of_a_linear_field() {
     let described = bricks("C3D8", 4);
@@ -216,8 +231,8 @@ fn stress_stiffness_turns_the_load_and_stresses_are_those_of_a_linear_field() {
     // Any displacements: the stress stiffness times positions is the force K u, and it leaves translations free.
     let field = Mat::from_fn(n, 1, |i, _| 1e-3 * (1.7 * i as f64).sin());
     let moved = proved.displacements(field.as_ref());
-    let of_stress = proved
-        .in_rows(&proved.stress_stiffness(moved.col(0).try_as_col_major().expect("a column").as_slice()));
+    let by_nodes = proved.stress_stiffness(moved.col(0).try_as_col_major().expect("a column").as_slice());
+    let of_stress = in_rows(&proved, &by_nodes, n);
     let position = |row: usize, along: usize| {
         let (node, direction) = labels[row];
         if usize::from(direction) == along + 1 { described.positions[&node] } else { [0.0; 3] }

@@ -294,7 +294,7 @@ fn selections_for_a_carried_body_keep_all_groups_and_hold() {
 fn bolted_bracket() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let from = fixtures().join("models/bracket_hex20");
-    for file in ["K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv"] {
+    for file in ["K.mtx.gz", "M.mtx.gz", "nodes.csv", "dofs.csv", "matrices.inp.gz"] {
         fs::copy(from.join(file), folder.path().join(file)).expect("copied");
     }
     let text = fs::read_to_string(from.join("model.toml")).expect("a manifest");

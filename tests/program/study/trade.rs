@@ -513,7 +513,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
         let here: Vec<_> = cheaper.iter().filter(|own| beyond(own, at)).collect();
         let only = here.iter().filter(|own| !beyond(own, 1 - at)).count();
         assert_eq!((case.ruled_out, case.ruled_out_alone), (here.len(), only), "case {at}");
-        assert!((case.reserved - [0.1, 0.0][at]).abs() < 1e-15);
+        assert_eq!(case.reserved, [0.1, 0.0][at]);
         let own = measured(&both.rows[case.alone.row().expect("a candidate")]);
         assert!(own.by_case[at].worst <= most[at] && own.multiplications <= taken.multiplications);
     }

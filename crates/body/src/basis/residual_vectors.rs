@@ -66,7 +66,8 @@ pub fn free_static_responses_twice(
     Ok(both.map(|x| model.expand(&x).into_owned()))
 }
 
-/// Returns the static responses G F to all columns of `loads` (N x m), made self-equilibrated by inertia relief. Interfaces that the couplings of `model` keep rigid move as rigid bodies.
+/// Returns the static responses G F to all columns of `loads` (N x m), made self-equilibrated by inertia relief. Interfaces
+/// that the couplings of `model` keep rigid move as rigid bodies.
 ///
 /// * `first`: about the first flexible eigenvalue.
 ///

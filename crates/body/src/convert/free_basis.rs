@@ -102,20 +102,13 @@ impl<'m> FreeBasis<'m> {
             (pencil.apply_mass(self.modes.as_ref()), pencil.apply_stiffness(self.modes.as_ref()));
         let mass = gram(self.modes.as_ref(), inertial.as_ref());
         let modal = gram(self.modes.as_ref(), forces.as_ref());
-        let beside_rigid = self.beside_rigid(forces);
+        let beside_rigid = beside_rigid(self.coupled.model(), &self.rigid, forces);
         [(inertial, &mass), (elastic, &self.stiffness)].map(|(balanced, matrix)| {
             let amplitudes =
                 solve(matrix, &modal).expect("mass and stiffness of modes are positive definite");
             // Inner forces of rigid interfaces do not deform the body.
             self.coupled.restrict(&beside_rigid - combine(balanced.as_ref(), amplitudes.as_ref()))
         })
-    }
-
-    /// Returns F - M R R'F: nodal forces (N x m) less those that accelerate the body rigidly.
-    fn beside_rigid(&self, forces: &Mat<f64>) -> Mat<f64> {
-        let resultants = gram(self.rigid.as_ref(), forces.as_ref());
-        let inertial = self.coupled.model().pencil().apply_mass(self.rigid.as_ref());
-        forces - combine(inertial.as_ref(), resultants.as_ref())
     }
 
     /// Removes rigid motion from fields (N x m): the part that rounding leaves.
@@ -169,11 +162,20 @@ impl<'m> FreeBasis<'m> {
         let accelerations = |modal: &Mat<f64>| {
             solve(&mass, modal).expect("the mass of independent modes is positive definite")
         };
-        let forces = self.beside_rigid(&loads.forces);
+        let forces = beside_rigid(model, &self.rigid, &loads.forces);
         let modal = accelerations(&loads.modal(&self.modes, groups));
         let columns = gram(side.as_ref(), forces.as_ref()) - combine(of_inertia.as_ref(), modal.as_ref());
         (combine(of_inertia.as_ref(), accelerations(&self.stiffness).as_ref()), columns)
     }
+}
+
+/// Returns F - M R R'F: nodal forces (N x m) less those that accelerate the body rigidly.
+///
+/// * `rigid`: rigid motions R, M-orthonormal.
+pub(super) fn beside_rigid(model: &FeModel, rigid: &Mat<f64>, forces: &Mat<f64>) -> Mat<f64> {
+    let resultants = gram(rigid.as_ref(), forces.as_ref());
+    let inertial = model.pencil().apply_mass(rigid.as_ref());
+    forces - combine(inertial.as_ref(), resultants.as_ref())
 }
 
 /// Returns A^-1 B for a symmetric positive definite A; `None` for another.

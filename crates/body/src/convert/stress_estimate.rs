@@ -13,15 +13,14 @@
 //! for shells the change of stiffness is 0.64 to 1.65 times the true one.
 
 use super::body_modes::reduced;
+use super::free_basis::beside_rigid;
 use crate::basis::{CoupledModel, centrifugal_loads, coupled_static_responses, rigid_modes};
 use crate::flex_body::{Frame, along};
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_eigen::ResponseAccuracy;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{
-    Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix, combine, gram, side_by_side,
-};
+use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix, side_by_side};
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
 
 /// Stiffness at every node relative to that of its bars, which keeps a truss with mechanisms solvable. A larger value takes
@@ -160,8 +159,7 @@ impl<'m> Pairs<'m> {
         let loads = centrifugal_loads(model);
         let loads = side_by_side(&loads.iter().map(Mat::as_ref).collect::<Vec<_>>());
         let rigid = rigid_modes(model, &model.pencil())?;
-        let inertial = model.pencil().apply_mass(rigid.as_ref());
-        let balanced = &loads - combine(inertial.as_ref(), gram(rigid.as_ref(), loads.as_ref()).as_ref());
+        let balanced = beside_rigid(model, &rigid, &loads);
         let mut densities = vec![vec![0.0; self.pairs.len()]; loads.ncols()];
         // Pairs of nodes that resist rotation: the elongation under the static response of the body.
         if self.turns.contains(&true) {

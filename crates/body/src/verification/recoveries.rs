@@ -1,7 +1,7 @@
 //! Recoveries and named loads of a body, computed again from its model.
 
 use crate::convert::{BodyModes, BodyOfModel, NodesInFrame, Recovered};
-use crate::flex_body::{FlexBody, NamedLoad, Recovery, ReferenceConditions};
+use crate::flex_body::{FlexBody, NamedLoad, Recovery, ReferenceConditions, Storage};
 use crate::invariants::IdentityCheck;
 use faer::Mat;
 use flexbody_base::error::Result;
@@ -14,6 +14,11 @@ use flexbody_model::FeModel;
 const MAX_ROW_DIFFERENCE: f64 = 1e-6;
 /// Roundings of stored numbers that a row may show: it sums products of stored modes.
 const ROUNDINGS: f64 = 100.0;
+
+/// Returns the limit of what is computed again from static responses, relative to the largest of its kind.
+pub(super) fn limit_of_responses(storage: Storage) -> f64 {
+    MAX_ROW_DIFFERENCE + ROUNDINGS * storage.rounding()
+}
 
 /// Compares the recoveries and named loads that both `body` and `model` have. Empty if they share none.
 ///
@@ -38,7 +43,7 @@ pub(super) fn recovery_checks(
     let lowest = body.modes().eigenvalue.iter().copied().fold(f64::INFINITY, f64::min);
     let of_model = BodyOfModel { model, modes, place, modal_stiffness, lowest, held_at, is_check: true };
     let found = of_model.recoveries(body.groups(), &Context::QUIET)?;
-    let limit = MAX_ROW_DIFFERENCE + ROUNDINGS * body.storage().rounding();
+    let limit = limit_of_responses(body.storage());
     let rows = row_differences(body.recoveries(), &found);
     let loads = load_differences(body.named_loads(), &found.named_loads, model);
     let mut checks = Vec::new();

@@ -312,12 +312,8 @@ impl<'d> Describing<'d> {
     }
 
     fn finished(mut self) -> DescribedElements {
-        for ((kind, reason), Others { count, mut nodes }) in self.others {
-            nodes.sort_unstable();
-            nodes.dedup();
-            let elements = if count == 1 { "element" } else { "elements" };
-            let what = format!("{count} {elements} of type {kind}: {reason}");
-            self.described.not_described.push(NotDescribed { what, line: None, nodes });
+        for ((kind, reason), Others { count, nodes }) in self.others {
+            self.described.not_described.push(NotDescribed::elements(&kind, &reason, count, nodes));
         }
         self.described
     }

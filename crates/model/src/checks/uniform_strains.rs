@@ -13,7 +13,8 @@
 use crate::rows::centre_and_length;
 use crate::rows::neighbours::neighbours;
 use crate::{
-    AnsweredShapes, DofLabel, FeModel, ModelRecovery, Quantity, RecoveryOperator, StressPoint, pascals,
+    AnsweredShapes, DofLabel, FeModel, ModelRecovery, Quantity, RecoveryOperator, STRAIN_NAMES, StressPoint,
+    pascals,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -24,8 +25,6 @@ use std::collections::HashMap;
 
 /// Components of a stress, in the order of [`StressPoint::rows`], as pairs of axes.
 const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
-/// Names of the six uniform strains, in the order of [`uniform_strains`].
-pub const STRAIN_NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
 /// Largest deviation of a component from the expected one, relative to it.
 const MAX_DEVIATION: f64 = 0.1;

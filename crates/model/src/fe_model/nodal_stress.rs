@@ -2,12 +2,11 @@
 
 use crate::recovery::refuse_name;
 use crate::wording::name_some;
-use crate::{FeModel, ModelRecovery, NodalStress, Quantity, RecoveryOperator, RecoveryRow, StressNodes};
+use crate::{
+    FeModel, ModelRecovery, NodalStress, Quantity, RecoveryOperator, RecoveryRow, STRAIN_NAMES, StressNodes,
+};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-
-/// Components of a stress, in the order of its rows.
-const COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
 
 impl FeModel {
     /// Adds a recovery for each request of stresses at nodes, after those of other operators.
@@ -66,7 +65,7 @@ impl FeModel {
             let before = at.checked_sub(1).and_then(|at| stresses.places.get(at));
             let is_shared = shares(before) || shares(stresses.places.get(at + 1));
             let name = if is_shared { format!("{node} {material}") } else { node.to_string() };
-            COMPONENTS.map(|component| RecoveryRow {
+            STRAIN_NAMES.map(|component| RecoveryRow {
                 name: format!("{name} {component}"),
                 quantity: Quantity::Stress,
                 component: component.to_owned(),

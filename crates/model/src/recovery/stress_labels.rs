@@ -2,6 +2,10 @@
 
 use crate::RecoveryRow;
 
+/// Names of the components of stress and strain, also of the uniform strains of [`uniform_strains`](crate::uniform_strains), in
+/// their order.
+pub const STRAIN_NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];
+
 /// Component of a stress of a row, and the part of the name of the row before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct StressLabel<'r> {

@@ -70,7 +70,7 @@ impl<'m> StudyCase<'m> {
             None => None,
         };
         let stress_error = StressError::of_trace(sources[0].body(), &scene, &motion, context)?;
-        let reserved = 1.0 - (1.0 - reserved) * StressError::left(stress_error.as_ref());
+        let reserved = reserved + (1.0 - reserved) * (1.0 - StressError::left(stress_error.as_ref()));
         let warning = nodal.as_ref().and_then(NodalReference::warning);
         let unstressed = stress_error.as_ref().and_then(|own| own.warning(sources[0].body()));
         let found = [framed.found, said, warning.into_iter().chain(unstressed).collect()].concat();
