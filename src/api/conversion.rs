@@ -67,7 +67,7 @@ impl ConvertOptions {
 
     /// Sets the loads whose stress stiffness is computed from the elements of the deck, which K has to prove.
     pub fn geometric_stiffness(mut self, loads: StressLoads) -> Self {
-        self.0.stress_stiffness = loads;
+        self.0.stress_stiffness = Some(loads);
         self
     }
 

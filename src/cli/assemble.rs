@@ -10,7 +10,7 @@ use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, ModeSettings};
-use flexbody_body::convert::MeshChoice;
+use flexbody_body::convert::{MeshChoice, StressLoads};
 use flexbody_cluster::{Prepared, read_found, read_prepared};
 use flexbody_input::{LoadSource, ModelFiles};
 use flexbody_linalg::context::Context;
@@ -68,6 +68,8 @@ fn conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<Conv
         modes: arguments.modes.map(u64::from).or(prepared.wanted.modes).map(|modes| modes as usize),
         max_frequency: prepared.wanted.below.filter(|_| arguments.modes.is_none()).map(hertz),
         residual_vectors: Some(Vec::new()),
+        // The command has no option for it.
+        stress_stiffness: Some(StressLoads::default()),
         accuracy: prepared.accuracy(),
         storage: arguments.storage,
         frame: arguments.frame.clone().unwrap_or_default(),

@@ -62,7 +62,8 @@ impl ConvertArguments {
         };
         files.allow_implausible |= self.allow_implausible;
         files.keep_soft_rotations |= self.keep_soft_rotations;
-        files.describe_elements |= !self.geometric_stiffness.is_empty();
+        // The summary names what the elements would give, unless the command line leaves it out.
+        files.describe_elements |= self.geometric_stiffness.is_none_or(|loads| !loads.is_empty());
         files.nodal_stresses.extend(self.stress.iter().map(|nodes| stress_at(nodes, self.stress.len())));
         Ok(files)
     }

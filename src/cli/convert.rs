@@ -217,6 +217,7 @@ impl ConversionRun {
         refuse_warnings(self.printing, &diagnostics)?;
         let mut run = run_data(output, conversion, diagnostics.clone(), phases);
         // Reading may have taken more memory than the work will.
+        run.offered_stiffness = made.offered_stiffness.names();
         run.memory_estimate_bytes =
             conversion.plan.as_ref().map(|plan| peak.unwrap_or(0).max(resident + plan.bytes()));
         let facts = Facts::new(&conversion.body, &run);
@@ -307,6 +308,7 @@ fn run_data(
         attempts: conversion.plan.iter().flat_map(|plan| plan.attempts.iter().map(search_attempt)).collect(),
         counters: counters.iter().map(|&(name, count)| (name.to_owned(), count)).collect(),
         accuracy: conversion.body.source().settings["accuracy"].as_str().unwrap_or_default().to_owned(),
+        offered_stiffness: Vec::new(),
         output: Some(output),
         lumped_modes,
     }

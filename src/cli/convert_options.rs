@@ -45,7 +45,8 @@ pub(super) fn with_settings_of(arguments: &ConvertArguments, path: &Path) -> Res
     own.lumped = if lumped.is_empty() { "none".to_owned() } else { lumped };
     own.storage = body.storage();
     let stressed = names("stress_stiffness").join(",");
-    own.geometric_stiffness = StressLoads::parse(&stressed)
+    let stressed = StressLoads::parse(&stressed)
         .map_err(|name| refused(&format!("its stress stiffness `{name}` is not known")))?;
+    own.geometric_stiffness = own.geometric_stiffness.or((!stressed.is_empty()).then_some(stressed));
     Ok(own)
 }

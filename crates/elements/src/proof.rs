@@ -106,6 +106,14 @@ pub fn prove(
     Ok(ProvedElements::new(described, formulations, places, labels.len()))
 }
 
+impl DescribedElements {
+    /// Returns true if K may prove the elements: there are elements, all are of types with a known formulation, and the
+    /// description leaves nothing out. No matrix is computed.
+    pub fn may_be_proved(&self) -> bool {
+        !self.groups.is_empty() && self.not_described.is_empty() && unknown_types(self).is_empty()
+    }
+}
+
 /// Type and number of nodes of the elements of a group, which decide about their formulation.
 type Kind<'g> = (&'g str, usize);
 

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 const ELEMENTS_PER_TASK: usize = 64;
 
 /// Elements whose matrices are in memory at a time.
-const ELEMENTS_AT_ONCE: usize = 8192;
+const ELEMENTS_AT_ONCE: usize = 1024;
 
 /// Places with stresses of a parallel task.
 const PLACES_PER_TASK: usize = 16;
@@ -48,6 +48,14 @@ pub struct NodalStresses<'a> {
 struct Member {
     group: u32,
     nodes: Vec<u32>,
+}
+
+/// Stress stiffness of an element.
+struct ElementStiffness {
+    /// Places of its entries, row by row, among those of the matrix of all nodes.
+    places: Vec<usize>,
+    /// Entries for each column of displacements.
+    matrices: Vec<Vec<f64>>,
 }
 
 /// Pattern of a symmetric matrix with one row per node.
@@ -102,52 +110,52 @@ impl ProvedElements {
         })
     }
 
-    /// Returns the stiffness g of the stress that displacements cause, a matrix with one row per node of the elements: the
-    /// stress stiffness is its Kronecker product with I3,
+    /// Returns the stiffness g of the stress that each column of displacements causes, a matrix with one row per node of the
+    /// elements: the stress stiffness is its Kronecker product with I3,
     ///
     /// g_ab = sum over points of w det J grad N_a' s grad N_b.
     ///
-    /// * `displacements`: of the nodes of elements, three for each.
+    /// All columns share the geometry of the elements; their matrices are in memory together.
+    ///
+    /// * `displacements`: of the nodes of elements, three rows for each.
     ///
     /// # Panics
-    /// If the number of displacements is not three for each node.
-    pub fn stress_stiffness(&self, displacements: &[f64]) -> SymmetricMatrix {
-        assert_eq!(displacements.len(), 3 * self.n_nodes(), "three displacements per node");
-        let mut values = vec![0.0; self.neighbours.nodes.len()];
+    /// If the number of rows is not three for each node.
+    pub fn stress_stiffness(&self, displacements: MatRef<'_, f64>) -> Vec<SymmetricMatrix> {
+        assert_eq!(displacements.nrows(), 3 * self.n_nodes(), "three displacements per node");
+        let mut values = vec![vec![0.0; self.neighbours.nodes.len()]; displacements.ncols()];
         for part in self.members.chunks(ELEMENTS_AT_ONCE) {
-            let matrices = parallel::values(part.len(), ELEMENTS_PER_TASK, |at| {
+            let all = parallel::values(part.len(), ELEMENTS_PER_TASK, |at| {
                 self.stiffness_of(&part[at], displacements)
             });
-            for (member, matrix) in part.iter().zip(matrices) {
-                for (&row, of_row) in member.nodes.iter().zip(matrix.chunks(member.nodes.len())) {
-                    for (&column, value) in member.nodes.iter().zip(of_row) {
-                        values[self.neighbours.place(row, column)] += value;
-                    }
+            // The order of the sums is that of the elements.
+            for ElementStiffness { places, matrices } in all {
+                for (values, matrix) in values.iter_mut().zip(matrices) {
+                    places.iter().zip(matrix).for_each(|(place, value)| values[*place] += value);
                 }
             }
         }
-        let n = self.n_nodes();
-        let matrix = CscMatrix::from_parts(
-            n,
-            n,
-            self.neighbours.pointers.clone(),
-            self.neighbours.nodes.clone(),
-            values,
-        );
-        SymmetricMatrix::symmetrised(matrix)
+        let (n, Neighbours { pointers, nodes }) = (self.n_nodes(), &self.neighbours);
+        let matrix = |values| CscMatrix::from_parts(n, n, pointers.clone(), nodes.clone(), values);
+        values.into_iter().map(|values| SymmetricMatrix::symmetrised(matrix(values))).collect()
     }
 
-    /// Returns the stress stiffness of an element, row by row.
-    fn stiffness_of(&self, member: &Member, displacements: &[f64]) -> Vec<f64> {
+    /// Returns the stress stiffness of an element for each column of displacements.
+    fn stiffness_of(&self, member: &Member, displacements: MatRef<'_, f64>) -> ElementStiffness {
         let (formulation, group) = (self.formulations[member.group as usize], member.group as usize);
-        let at = |node: &u32| 3 * *node as usize;
-        let moved: Vec<[f64; 3]> =
-            member.nodes.iter().map(|node| std::array::from_fn(|k| displacements[at(node) + k])).collect();
-        let positions = self.positions_of(member);
+        let of_node =
+            |node: &u32, c: usize| std::array::from_fn(|k| displacements[(3 * *node as usize + k, c)]);
+        let moved: Vec<Vec<[f64; 3]>> = (0..displacements.ncols())
+            .map(|c| member.nodes.iter().map(|node| of_node(node, c)).collect())
+            .collect();
         let section = &self.described.groups[group].section;
-        let stresses = formulation.stresses(&positions, &moved, section);
-        let matrix = stresses.and_then(|stresses| formulation.geometric_stiffness(&positions, &stresses));
-        matrix.expect("elements with a stiffness have stresses")
+        let matrices = formulation.stress_stiffness(&self.positions_of(member), &moved, section);
+        let pairs =
+            member.nodes.iter().flat_map(|row| member.nodes.iter().map(move |column| (*row, *column)));
+        ElementStiffness {
+            places: pairs.map(|(row, column)| self.neighbours.place(row, column)).collect(),
+            matrices: matrices.expect("elements with a stiffness have stresses"),
+        }
     }
 
     /// Returns the operator of stresses at nodes: for each node of `nodes`, and each material around it, the mean over its

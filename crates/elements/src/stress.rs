@@ -118,13 +118,25 @@ impl Point {
     }
 
     /// Returns the strain for displacements of all functions.
-    fn strain(&self, u: &[[f64; 3]]) -> [f64; 6] {
-        let mut strain = [0.0; 6];
+    pub(crate) fn strain(&self, u: &[[f64; 3]]) -> [f64; 6] {
+        // Gradient of the displacement (row: direction, column: derivative along x, y, z).
+        let mut slope = [[0.0; 3]; 3];
+        let mut growth = 0.0;
         for (node, displacement) in u.iter().enumerate() {
-            for (direction, size) in displacement.iter().enumerate() {
-                for (sum, unit) in strain.iter_mut().zip(self.unit_strain(node, direction)) {
-                    *sum += size * unit;
+            for (row, size) in slope.iter_mut().zip(displacement) {
+                for (entry, gradients) in row.iter_mut().zip(&self.gradients) {
+                    *entry += size * gradients[node];
                 }
+            }
+            if let Some(dilation) = &self.dilation {
+                growth +=
+                    (0..3).map(|direction| displacement[direction] * dilation[direction][node]).sum::<f64>();
+            }
+        }
+        let mut strain = [growth, growth, growth, 0.0, 0.0, 0.0];
+        for (row, places) in slope.iter().zip(PLACES) {
+            for (entry, place) in row.iter().zip(places) {
+                strain[place] += entry;
             }
         }
         strain

@@ -167,6 +167,7 @@ pub fn run_data() -> RunData {
         counters: vec![("factorisations".to_owned(), 2), ("solves".to_owned(), 96)],
         attempts: vec![attempt("cycles", Some("3 of 20 modes converged")), attempt("double precision", None)],
         accuracy: "standard".to_owned(),
+        offered_stiffness: Vec::new(),
         output: Some(("mount.flex.h5".to_owned(), 1_234_567)),
         lumped_modes: vec![],
     }

@@ -53,6 +53,9 @@ pub struct RunData {
     pub attempts: Vec<SearchAttempt>,
     /// Accuracy: `fast`, `standard`, `certified`.
     pub accuracy: String,
+    /// Loads whose geometric stiffness the body does not have, and the elements of the deck would give; as
+    /// `--geometric-stiffness` names them.
+    pub offered_stiffness: Vec<&'static str>,
     /// Name and size in bytes of the flex-body file.
     pub output: Option<(String, u64)>,
     /// Modes computed from the lumped masses, if requested.

@@ -9,7 +9,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, BasisKind, ImportedShapes, ModeSettings};
 use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, StressLoads, convert};
-use flexbody_body::flex_body::Storage;
+use flexbody_body::flex_body::{FlexBody, LoadKind, Storage, UnitLoad};
 use flexbody_body::invariants::FrameChoice;
 use flexbody_body::verification::accept;
 use flexbody_eigen::{Accuracy, FactorChoice, Method, Wanted};
@@ -49,8 +49,9 @@ pub struct ConversionRequest {
     pub lumped_modes: bool,
     /// Surface of the body.
     pub mesh: MeshChoice,
-    /// Loads whose stress stiffness is computed from the elements of the deck.
-    pub stress_stiffness: StressLoads,
+    /// Loads whose stress stiffness is computed from the elements of the deck; `None` computes none, and lets the result
+    /// [offer](Converted::offered_stiffness) what could be computed.
+    pub stress_stiffness: Option<StressLoads>,
     /// Floats of shapes and of the inertia of the modes.
     pub storage: Storage,
     /// Parts of the body that are stated; `None` if a scene selects them, and for the whole body without a scene.
@@ -76,7 +77,7 @@ impl Default for ConversionRequest {
             lumped,
             lumped_modes: false,
             mesh,
-            stress_stiffness: StressLoads::default(),
+            stress_stiffness: None,
             storage: Storage::default(),
             stated: None,
             allow_unjudged: false,
@@ -92,9 +93,16 @@ pub struct Converted {
     pub conversion: Conversion,
     /// Decisions about terms and modes; `None` without a scene, and if the parts were stated.
     pub selection: Option<Selection>,
+    /// Loads whose stress stiffness the body does not have although the deck describes the elements; empty if the request
+    /// states the loads, `none` among them.
+    pub offered_stiffness: StressLoads,
 }
 
 impl Converted {
+    fn new(conversion: Conversion, selection: Option<Selection>) -> Self {
+        Self { conversion, selection, offered_stiffness: StressLoads::default() }
+    }
+
     /// Returns the diagnostics of the conversion and of the selection.
     pub fn diagnostics(&self) -> Vec<Diagnostic> {
         let selected = self.selection.iter().flat_map(|selection| &selection.diagnostics);
@@ -232,7 +240,7 @@ impl ConversionRequest {
             lumped: self.lumped.clone(),
             lumped_modes: self.lumped_modes,
             mesh: self.mesh,
-            stress_stiffness: self.stress_stiffness,
+            stress_stiffness: self.stress_stiffness.unwrap_or_default(),
         };
         let mut made = match cases {
             Some(cases) => self
@@ -247,6 +255,9 @@ impl ConversionRequest {
             made.conversion.body = made.conversion.body.rounded_to_f32()?;
         }
         accept(&made.conversion.body)?;
+        if self.stress_stiffness.is_none() && model.describes_elements() {
+            made.offered_stiffness = absent_stiffness(&made.conversion.body);
+        }
         Ok(made)
     }
 
@@ -273,7 +284,7 @@ impl ConversionRequest {
             conversion.body = conversion.body.subset(&stated.subset)?;
             conversion = noted(conversion);
         }
-        Ok(Converted { conversion, selection: None })
+        Ok(Converted::new(conversion, None))
     }
 
     fn for_cases(
@@ -287,11 +298,23 @@ impl ConversionRequest {
         let tailoring = Tailoring { settings, by_band, of_motion: self.basis == BasisKind::Scene };
         if let Some(stated) = &self.stated {
             let conversion = noted(convert_stated(model, &tailoring, cases, stated, context)?);
-            return Ok(Converted { conversion, selection: None });
+            return Ok(Converted::new(conversion, None));
         }
         let (conversion, selection) = convert_for(model, &tailoring, cases, context)?;
-        Ok(Converted { conversion, selection: Some(selection) })
+        Ok(Converted::new(conversion, Some(selection)))
     }
+}
+
+/// Returns the loads of motion and interfaces whose geometric stiffness the body does not have. A body with that of spin
+/// lacks none: what its maker left out is not wanted.
+fn absent_stiffness(body: &FlexBody) -> StressLoads {
+    if body.has_spin_stiffness() || body.missing_stiffness(true).is_empty() {
+        return StressLoads::default();
+    }
+    let is_at_interface = |one: &UnitLoad| matches!(one.kind, LoadKind::Force(_) | LoadKind::Moment(_));
+    let interfaces = body.interfaces().iter().any(|interface| interface.reference.is_some())
+        && !body.geometric_stiffness().iter().any(|one| is_at_interface(&one.load));
+    StressLoads { spin: true, interfaces, loads: false }
 }
 
 /// Refuses the first contradiction that a request has.

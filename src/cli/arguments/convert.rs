@@ -118,9 +118,10 @@ pub struct ConvertArguments {
     #[arg(long, requires = "scene", help_heading = SCENE)]
     pub allow_unjudged: bool,
     /// Loads whose stress stiffness is computed from the elements of the deck, which K has to prove (FB462): spin,
-    /// interfaces (unit forces and moments), loads (named ones, except preloads), comma-separated, or none [default: none]
-    #[arg(long, value_name = "LOADS", value_parser = stress_loads, default_value = "none", hide_default_value = true, help_heading = STRESS)]
-    pub geometric_stiffness: StressLoads,
+    /// interfaces (unit forces and moments), loads (named ones, except preloads), comma-separated, or none [default: none,
+    /// and the summary names the option where the deck describes its elements]
+    #[arg(long, value_name = "LOADS", value_parser = stress_loads, help_heading = STRESS)]
+    pub geometric_stiffness: Option<StressLoads>,
     /// Recover stresses from the elements of the deck, which K has to prove (FB462), as recovery `stress`: at all nodes
     /// (nodes), at those on the surface (surface), or at those of a node set, by its name [repeatable]
     #[arg(long, value_name = "NODES", help_heading = STRESS)]

@@ -7,6 +7,7 @@ mod jobs;
 mod manifest_settings;
 mod memory;
 mod nastran_files;
+mod offered_stiffness;
 mod plane;
 mod shared_doors;
 mod split;

@@ -13,6 +13,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_eigen::energy_noise;
+use flexbody_linalg::ties::first_smallest;
 use flexbody_linalg::{SymmetricMatrix, side_by_side, symmetric_eigen};
 use flexbody_model::{Damping, FeModel, GeometricStiffness, LoadKind, ratio_at};
 use nalgebra::Vector3;
@@ -178,21 +179,42 @@ pub fn unit_rotations(model: &FeModel, frame: &Frame) -> Mat<f64> {
     }
 }
 
-/// Returns a warning if the basis contains centrifugal loads, which means that the body spins, but
-/// geometric stiffness for spin is not given. The warning states the spin rate at which softening becomes
-/// significant.
+/// Help of the warning about missing geometric stiffness where the deck describes its elements.
+const COMPUTE_FROM_ELEMENTS: &str = "convert with --geometric-stiffness spin, which computes it from the elements of the deck, or keep to spin rates far below the value in the message";
+
+/// Returns a warning if the basis contains centrifugal loads, which means that the body spins, but the body has no geometric
+/// stiffness of spin. The warning states the rotation at which 1 % of a stiffness is missing: by the estimate of the body, or
+/// by the softening alone if it has none.
 pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &FlexBody) -> Option<Diagnostic> {
     let BasisChoice::Free(free) = basis else { return None };
-    let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
-    if given || !free.residual_vectors.contains(&Loads::Centrifugal) {
+    if body.has_spin_stiffness() || !free.residual_vectors.contains(&Loads::Centrifugal) {
         return None;
     }
+    let reached = if body.estimated_stiffness().is_empty() { softened(body)? } else { missing(body)? };
+    let message = format!("centrifugal loads are wanted without geometric stiffness for spin: {reached}");
+    let warning = Diagnostic::new(Code::GeometricStiffnessNone, message);
+    Some(if model.describes_elements() { warning.with_help(COMPUTE_FROM_ELEMENTS) } else { warning })
+}
+
+/// Returns the rotation in words at which the centrifugal term takes 1 % of a stiffness; `None` if it takes nothing.
+fn softened(body: &FlexBody) -> Option<String> {
     let (axis, part) = body.worst_spin().filter(|(_, part)| *part > 0.0)?;
+    let hertz = significant(body.units().frequency_of(SOFTENING / part), 4);
     let axis = axis_in_words(&axis);
-    let hertz = model.units().frequency_of(SOFTENING / part);
-    let message = format!(
-        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {} Hz about axis {axis} of the model",
-        significant(hertz, 4)
-    );
-    Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
+    Some(format!(
+        "the centrifugal term takes 1 % of the stiffness of a motion at {hertz} Hz about axis {axis} of the model"
+    ))
+}
+
+/// Returns the slowest rotation about an axis of the model in words at which the missing stress stiffness is 1 % of a
+/// stiffness; `None` if no rotation changes a stiffness.
+fn missing(body: &FlexBody) -> Option<String> {
+    let axes = if body.dimension() == 2 { 2..3 } else { 0..3 };
+    let rates = axes.filter_map(|axis| Some((axis, body.missing_rate(axis)?)));
+    let (axis, rate) = first_smallest(rates, |(_, rate)| *rate)?;
+    let hertz = significant(body.units().frequency_of(rate * rate), 4);
+    let axis = axis_in_words(&Vector3::ith(axis, 1.0));
+    Some(format!(
+        "about 1 % of the stiffness of a motion is missing at {hertz} Hz of rotation about {axis} of the model (estimate)"
+    ))
 }

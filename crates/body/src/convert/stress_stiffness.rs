@@ -7,10 +7,12 @@ use crate::flex_body::Frame;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_eigen::ResponseAccuracy;
-use flexbody_elements::ProvedElements;
 use flexbody_linalg::context::Context;
-use flexbody_linalg::{contiguous, gram, multiply, side_by_side, zeros};
+use flexbody_linalg::{SymmetricMatrix, gram, multiply, side_by_side, zeros};
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
+
+/// Loads whose stress stiffness by nodes is in memory at a time.
+const LOADS_AT_ONCE: usize = 8;
 
 /// Size of a static response, relative to the largest of its kind, below which the load stresses nothing.
 const MIN_RESPONSE: f64 = 1e-9;
@@ -70,23 +72,28 @@ pub(crate) fn stress_stiffness(
     let shapes = side_by_side(&[of.modes.as_ref(), unit_rotations(model, of.frame).as_ref()]);
     let shapes = elements.displacements(shapes.as_ref());
     let moved = elements.displacements(responses.as_ref());
-    let of_load = |(column, &at): (usize, &usize)| {
-        let load = &unit_loads[at];
-        let alike = columns.iter().zip(&norms).filter(|(at, _)| unit_loads[**at].kind == load.kind);
+    let is_stressed = |column: &usize| {
+        let kind = &unit_loads[columns[*column]].kind;
+        let alike = columns.iter().zip(&norms).filter(|(at, _)| unit_loads[**at].kind == *kind);
         let largest = alike.map(|(_, norm)| *norm).fold(0.0, f64::max);
-        (norms[column] > MIN_RESPONSE * largest).then(|| {
-            let matrix = reduced_by_nodes(&elements, contiguous(moved.col(column)), &shapes);
-            GeometricStiffness { load: load.clone(), matrix }
-        })
+        norms[*column] > MIN_RESPONSE * largest
     };
-    Ok(columns.iter().enumerate().filter_map(of_load).collect())
+    let stressed: Vec<usize> = (0..columns.len()).filter(is_stressed).collect();
+    let mut all = Vec::with_capacity(stressed.len());
+    for part in stressed.chunks(LOADS_AT_ONCE) {
+        let moved = Mat::from_fn(moved.nrows(), part.len(), |i, c| moved[(i, part[c])]);
+        for (column, by_nodes) in part.iter().zip(elements.stress_stiffness(moved.as_ref())) {
+            let load = unit_loads[columns[*column]].clone();
+            all.push(GeometricStiffness { load, matrix: reduced_by_nodes(&by_nodes, &shapes) });
+        }
+    }
+    Ok(all)
 }
 
-/// Returns S' (g kron I3) S for the stress stiffness g of displacements, and shapes S by the nodes of the elements.
-fn reduced_by_nodes(elements: &ProvedElements, moved: &[f64], shapes: &Mat<f64>) -> Mat<f64> {
-    let by_nodes = elements.stress_stiffness(moved);
+/// Returns S' (g kron I3) S for a stress stiffness g and shapes S by the nodes of the elements.
+fn reduced_by_nodes(by_nodes: &SymmetricMatrix, shapes: &Mat<f64>) -> Mat<f64> {
     let mut product = zeros(shapes.nrows(), shapes.ncols());
-    multiply(&by_nodes, 3, shapes.as_ref(), product.as_mut());
+    multiply(by_nodes, 3, shapes.as_ref(), product.as_mut());
     let reduced = gram(shapes.as_ref(), product.as_ref());
     Mat::from_fn(reduced.nrows(), reduced.ncols(), |i, j| 0.5 * (reduced[(i, j)] + reduced[(j, i)]))
 }

@@ -29,6 +29,12 @@ impl FeModel {
         proof.clone().map_err(Error::new)
     }
 
+    /// Returns true if the deck describes all elements, springs and constraints in a way that K may prove. Nothing is
+    /// assembled.
+    pub fn describes_elements(&self) -> bool {
+        self.dimension() == 3 && self.data.elements.as_ref().is_some_and(|elements| elements.may_be_proved())
+    }
+
     fn prove_elements(&self) -> std::result::Result<ProvedElements, Vec<Diagnostic>> {
         let unproved = |message: String| Diagnostic::new(Code::ElementsUnproved, message);
         let Some(described) = &self.data.elements else {

@@ -3,7 +3,8 @@
 use super::completeness::{Completeness, GuaranteeFacts, TermFacts};
 use super::craig_bampton::CraigBamptonFacts;
 use super::geometric_stiffness::{
-    GeometricStiffnessFacts, InertiaStiffnessFacts, softening_hz, stress_hz, stress_stiffness_in_words,
+    GeometricStiffnessFacts, InertiaStiffnessFacts, missing_stiffness_in_words, softening_hz, stress_hz,
+    stress_stiffness_in_words,
 };
 use super::held::HeldFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
@@ -253,9 +254,9 @@ pub(super) struct ModeFacts {
     /// Spin about each axis of the model at which the stress stiffness that the body does not have changes 1 % of the
     /// stiffness of a motion, by its estimate; `None` if nothing is missing. Unit: Hz.
     pub stress_hz: Option<[Option<f64>; 3]>,
-    /// True if the body has geometric stiffness of some spins.
+    /// Missing stress stiffness in words, and the option that computes it; `None` if nothing is missing.
     #[serde(skip)]
-    pub has_spin_stiffness: bool,
+    pub missing_stiffness: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -333,6 +334,7 @@ impl<'b> Facts<'b> {
     pub fn new(body: &'b FlexBody, run: &RunData) -> Self {
         let frequency_hz = body.frequencies_hz();
         let lumped_modes = run.lumped_modes.iter().map(|l| LumpedModesFacts::of(l, &frequency_hz)).collect();
+        let (softening, stress) = (softening_hz(body), stress_hz(body));
         let known = RunData { diagnostics: Vec::new(), lumped_modes: Vec::new(), ..run.clone() };
         Self {
             flex_body: body,
@@ -353,10 +355,15 @@ impl<'b> Facts<'b> {
                 damping: DampingFacts::of(body),
                 geometric_stiffness: GeometricStiffnessFacts::of(body),
                 inertia_stiffness: InertiaStiffnessFacts::of(body),
-                softening_hz: softening_hz(body),
+                softening_hz: softening,
                 stress_stiffness: stress_stiffness_in_words(body),
-                stress_hz: stress_hz(body),
-                has_spin_stiffness: body.has_spin_stiffness(),
+                stress_hz: stress,
+                missing_stiffness: missing_stiffness_in_words(
+                    softening.as_ref(),
+                    stress.as_ref(),
+                    body.has_spin_stiffness(),
+                    &run.offered_stiffness,
+                ),
                 worst_residual: worst_residual(body),
                 craig_bampton: CraigBamptonFacts::of(body),
                 held: HeldFacts::of(body),

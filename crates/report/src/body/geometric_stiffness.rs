@@ -117,13 +117,32 @@ pub(super) fn stress_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
+/// Returns what a body without geometric stiffness of spin leaves out, and the option that computes it where the elements of
+/// the deck would give it; `None` for a body that lacks none.
+///
+/// * `offered`: loads of the option, empty where the elements are not known.
+pub(super) fn missing_stiffness_in_words(
+    softening: Option<&[Option<f64>; 3]>,
+    stress: Option<&[Option<f64>; 3]>,
+    is_partial: bool,
+    offered: &[&str],
+) -> Option<String> {
+    let words = missing_in_words(softening, stress?, is_partial);
+    let option = offered.join(",");
+    Some(if offered.is_empty() {
+        words
+    } else {
+        format!("{words}; --geometric-stiffness {option} computes it from the elements of the deck")
+    })
+}
+
 /// Ratio of the rotation that takes all of a stiffness to the one that takes 1 % of it.
 const CRITICAL_RATIO: f64 = 10.0;
 
 /// Returns the rotations in words at which 1 % of a stiffness is missing, and the critical speeds below them, where the
 /// centrifugal term takes all of a stiffness: `no geometric stiffness: about 1 % of a stiffness is missing at 12.5 Hz of
 /// rotation about z of the model (estimate); critical speed about x from 115 Hz`.
-pub(super) fn missing_in_words(
+fn missing_in_words(
     softening: Option<&[Option<f64>; 3]>,
     stress: &[Option<f64>; 3],
     is_partial: bool,

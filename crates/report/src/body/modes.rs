@@ -3,7 +3,6 @@
 use super::completeness::{Completeness, GuaranteeFacts, cut};
 use super::craig_bampton::CraigBamptonFacts;
 use super::facts::{Facts, ModeFacts};
-use super::geometric_stiffness::missing_in_words;
 use super::glossary::{word, word_as};
 use super::held::HeldFacts;
 use crate::document::{Block, Inline, Table, Term, cells, heading, listed, quantity};
@@ -181,10 +180,12 @@ fn completeness(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(listed("geometric", &modes.geometric_stiffness, |one| one.in_words()));
     let inertia = modes.inertia_stiffness.as_ref();
     items.extend(inertia.map(|own| Term::new("Stiffness of inertia", own.in_words()).short("inertia K")));
-    items.extend(modes.stress_hz.as_ref().map(|hertz| {
-        let words = missing_in_words(modes.softening_hz.as_ref(), hertz, modes.has_spin_stiffness);
-        Term::new(word_as("geometric stiffness", "Spin"), words).short("spin")
-    }));
+    items.extend(
+        modes
+            .missing_stiffness
+            .as_ref()
+            .map(|words| Term::new(word_as("geometric stiffness", "Spin"), words.as_str()).short("spin")),
+    );
     let stressed = modes.stress_stiffness.as_ref();
     items.extend(stressed.map(|own| {
         Term::new(word_as("geometric stiffness", "Stress stiffness"), own.as_str()).short("stress K")

@@ -3,7 +3,6 @@
 
 use super::craig_bampton::CraigBamptonFacts;
 use super::facts::{Facts, InterfaceFacts, RecoveryFacts, RunFacts};
-use super::geometric_stiffness::missing_in_words;
 use super::lumped::{LumpedFacts, LumpedModesFacts, scheme_in_words};
 use super::named_loads::NamedLoadFacts;
 use crate::document::text::{self, Screen};
@@ -131,11 +130,7 @@ fn modes(facts: &Facts<'_>) -> Vec<Term> {
     items.extend(
         modes.inertia_stiffness.as_ref().map(|own| entry(Tone::Plain, "inertia K", own.in_words(), 3)),
     );
-    let missing = modes
-        .stress_hz
-        .as_ref()
-        .map(|hz| missing_in_words(modes.softening_hz.as_ref(), hz, modes.has_spin_stiffness));
-    items.extend(missing.map(|words| entry(Tone::Plain, "spin", words, 2)));
+    items.extend(modes.missing_stiffness.as_ref().map(|words| entry(Tone::Plain, "spin", words.as_str(), 4)));
     items.extend(modes.stress_stiffness.as_ref().map(|own| entry(Tone::Good, "stress K", own.as_str(), 3)));
     let dropped: Vec<_> = facts.terms.iter().filter(|term| !term.kept).collect();
     items.extend(listed_to(MAX_LISTED, "left out", &dropped, |term| {
