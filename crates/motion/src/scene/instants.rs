@@ -11,6 +11,7 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
 /// State, accelerations and loads of a body at one time. Vectors are along the axes of the frame of the
 /// [`FramedScene`], about its origin.
@@ -215,20 +216,44 @@ const MAX_INTERVAL_RATIO: f64 = 8.0;
 /// above those of the free body. A mode that merely follows slow forces does not oscillate at its natural frequency
 /// omega; the criterion is therefore the amplitude q'' / omega^2 that its acceleration q'' would have there.
 pub fn highest_excited_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
-    let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
-    let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
-    let tolerance = &scene.requirements.tolerance;
-    let least = part * tolerance.of_deformation() * roots.fold(0.0, f64::max);
-    let largest_accelerations = accelerations(motion, rates.len());
-    let counts =
-        |j: &usize| largest_accelerations[*j] > 0.0 && largest_accelerations[*j] / rates[*j] >= least;
-    (0..rates.len()).rev().find(counts).map_or(0.0, |last| rates[last])
+    ExcitedRates::new(body, scene, motion, part).between(f64::NEG_INFINITY, f64::INFINITY)
 }
 
-/// Returns the largest |q''| of every mode, by differences between samples with similar spacing.
-fn accelerations(motion: &Trace, modes: usize) -> Vec<f64> {
+/// Criterion of [`highest_excited_rate`], also for a part of the run: a mode that decays, or that a pulse excites late, counts
+/// while it moves.
+pub struct ExcitedRates<'m> {
+    motion: &'m Trace,
+    rates: Vec<f64>,
+    /// Smallest root of the elastic energy that counts.
+    least: f64,
+}
+
+impl<'m> ExcitedRates<'m> {
+    /// Creates the criterion for a motion of `body` in `scene`; see [`highest_excited_rate`] for `part`.
+    pub fn new(body: &FlexBody, scene: &Scene, motion: &'m Trace, part: f64) -> Self {
+        let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
+        let roots =
+            rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
+        let tolerance = &scene.requirements.tolerance;
+        let least = part * tolerance.of_deformation() * roots.fold(0.0, f64::max);
+        Self { motion, rates, least }
+    }
+
+    /// Returns the largest circular frequency of the modes that contribute to the motion between two times.
+    pub fn between(&self, start: f64, end: f64) -> f64 {
+        let time = &self.motion.time;
+        let first = time.partition_point(|own| *own < start).saturating_sub(1);
+        let last = (time.partition_point(|own| *own <= end) + 1).min(time.len());
+        let largest = accelerations(self.motion, self.rates.len(), first..last.max(first));
+        let counts = |j: &usize| largest[*j] > 0.0 && largest[*j] / self.rates[*j] >= self.least;
+        (0..self.rates.len()).rev().find(counts).map_or(0.0, |last| self.rates[last])
+    }
+}
+
+/// Returns the largest |q''| of every mode at the samples of a range, by differences between those with similar spacing.
+fn accelerations(motion: &Trace, modes: usize, samples: Range<usize>) -> Vec<f64> {
     let mut largest = vec![0.0f64; modes];
-    for (times, q) in motion.time.windows(3).zip(motion.q.windows(3)) {
+    for (times, q) in motion.time[samples.clone()].windows(3).zip(motion.q[samples].windows(3)) {
         let (before, after) = (times[1] - times[0], times[2] - times[1]);
         if !(before > 0.0
             && after > 0.0

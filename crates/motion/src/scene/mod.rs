@@ -45,7 +45,7 @@ pub use flexbody_model::StressPoint;
 pub use frame_motion::{CaseRun, FrameMotion, Omission};
 pub use framed_scene::FramedScene;
 pub use history::{Axes, History, VectorHistory};
-pub use instants::{Instant, highest_excited_rate, instants, unsettled_rate};
+pub use instants::{ExcitedRates, Instant, highest_excited_rate, instants, unsettled_rate};
 pub use interface_stresses::stresses_at_rigid_interfaces;
 pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};

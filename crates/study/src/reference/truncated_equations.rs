@@ -287,7 +287,7 @@ mod tests {
 
     fn grid(times: Vec<f64>) -> Grid {
         let whole = 0..times.len();
-        Grid { times, pieces: Vec::from([whole]) }
+        Grid { at_finest: times.len(), times, pieces: Vec::from([whole]) }
     }
 
     /// Returns modal forces that are zero.

@@ -332,7 +332,7 @@ fn resonances(
 ) -> Vec<Resonance> {
     let &ResonanceCriteria { settled, negligible, complete_below } = criteria;
     let Some(duration) = grid.times.last().copied().filter(|last| *last > 0.0) else { return Vec::new() };
-    let count = (2 * grid.times.len()).next_power_of_two().min(MOST_INSTANTS);
+    let count = (2 * grid.at_finest).next_power_of_two().min(MOST_INSTANTS);
     let step = duration / count as f64;
     // Spectrum of the force increments: the root of the elastic energy at each line.
     let combinations = combinations(amplitudes, energy);
@@ -452,7 +452,7 @@ mod tests {
     fn grid(count: usize, duration: f64) -> Grid {
         let times: Vec<f64> = (0..=count).map(|i| duration * i as f64 / count as f64).collect();
         let whole = 0..times.len();
-        Grid { times, pieces: Vec::from([whole]) }
+        Grid { at_finest: times.len(), times, pieces: Vec::from([whole]) }
     }
 
     fn found(force: impl Fn(f64) -> f64, negligible: f64) -> Vec<f64> {
