@@ -14,7 +14,7 @@
 use super::carrier::{CarriedPoint, refused};
 use super::modal_change::{rotations_without, shapes_without};
 use super::rotated_stiffness::{SplitStiffness, split, transformed, without_rotation};
-use super::{Carrier, FlexBody, Interface, Modes, ReferenceConditions, TermGroups};
+use super::{Carrier, FlexBody, Interface, Modes, ReferenceConditions};
 use crate::basis::BasisKind;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -46,21 +46,15 @@ impl FlexBody {
     ///
     /// # Errors
     /// FB212 if the body has no interface or node of this name; FB214 if `carrier` has no reference point
-    /// or no orientation, or if the body does not hold all groups of the kinetic energy.
+    /// or no orientation, or if the body holds W2 or W3 without W1, which both require in the modes of the carried body.
     pub fn carried(&self, carrier: &Carrier) -> Result<Self> {
-        if self.groups() != TermGroups::ALL {
-            let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
-            return Err(refused(format!(
-                "the body does not have {}, which its terms about {carrier} require",
-                dropped.join(", ")
-            )));
-        }
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
         if along_model && self.has_carrier_at_rest(carrier)? {
             let mut parts = self.clone().into_parts();
             (parts.geometric_stiffness, parts.rotated_stiffness) = self.carried_stiffness(carrier, None);
             return Self::new(parts)?.with_stated_damping(self.stated_damping());
         }
+        self.refuse_lost_groups(carrier)?;
         let at = self.place_of(carrier)?;
         let body = self.in_model_axes(at.reference)?;
         let CarriedPoint { motion, .. } = body.place_of(carrier)?;
@@ -92,6 +86,20 @@ impl FlexBody {
             _ => None,
         };
         Self::new(parts)?.with_stated_damping(self.stated_damping())
+    }
+
+    /// Returns an error if the body holds a group that it would not have with `carrier` at rest.
+    fn refuse_lost_groups(&self, carrier: &Carrier) -> Result<()> {
+        let held = self.groups();
+        let lost = held.in_carried_modes().dropped().filter(|group| held.has(*group));
+        let lost: Vec<&str> = lost.map(|group| group.name()).collect();
+        if lost.is_empty() {
+            return Ok(());
+        }
+        Err(refused(format!(
+            "the body does not have W1, which its {} about {carrier} require",
+            lost.join(" and ")
+        )))
     }
 
     /// Returns the geometric stiffness of this body, whose origin is the carrier, in the modes in which the carrier is at

@@ -238,6 +238,12 @@ impl TermGroups {
         Self { w1: self.w1 || other.w1, w2: self.w2 || other.w2, w3: self.w3 || other.w3 }
     }
 
+    /// Returns the groups of this set that are known in modes without their rigid motion: W2 and W3 of these depend on W1 of
+    /// the modes with it ([`Invariants::without_rigid_motion`]).
+    pub fn in_carried_modes(self) -> Self {
+        Self { w1: self.w1, w2: self.w1 && self.w2, w3: self.w1 && self.w3 }
+    }
+
     /// Returns the groups that are missing from this set.
     pub fn dropped(self) -> impl Iterator<Item = TermGroup> {
         TermGroup::ALL.into_iter().filter(move |group| !self.has(*group))

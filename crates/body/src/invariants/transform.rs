@@ -228,19 +228,22 @@ impl Invariants {
     /// quantities are exact if M commutes with rotations. Otherwise W0 to W3 of the removed rigid motion
     /// are those of a body with equal J whose mass commutes with rotations.
     ///
+    /// The new W1 is that of the old modes and of I0. The new W2 and W3 are those of the old modes, of the symmetric part of
+    /// Ibar, which W1 holds, and of I0: of a body without W1 the result has none of them.
+    ///
     /// # Panics
-    /// When the sizes disagree, or when a group is not held.
+    /// When the sizes disagree.
     pub fn without_rigid_motion(&self, taken: MatRef<'_, f64>) -> Self {
         let nf = self.n_modes();
         assert!((taken.nrows(), taken.ncols()) == (6, nf), "six rigid motions of every mode");
-        assert!(self.0.groups == TermGroups::ALL, "a body that holds all groups");
         let change = Mat::from_fn(6 + nf, nf, |i, j| match i.checked_sub(6) {
             None => -taken[(i, j)],
             Some(mode) => f64::from(mode == j),
         });
         let mut new = self.with_rigid_modes().with_basis(change.as_ref());
         new.0.modal_stiffness = self.0.modal_stiffness.clone();
-        let Some(general) = &self.0.general else { return new };
+        let groups = self.0.groups.in_carried_modes();
+        let Some(general) = &self.0.general else { return new.with_groups(groups) };
         let solid = |body: &Self| {
             let solid = body.as_solid();
             (solid.w0(), solid.w3_of_s())
@@ -253,7 +256,7 @@ impl Invariants {
             modal_mass: Mat::from_fn(nf, nf, |i, j| 0.5 * (modal_mass[(i, j)] + modal_mass[(j, i)])),
             plane: general.plane,
         });
-        if general.plane { new.about_z() } else { new }
+        (if general.plane { new.about_z() } else { new }).with_groups(groups)
     }
 }
 

@@ -5,6 +5,7 @@
 mod accepted;
 mod answered_shapes;
 mod beams;
+mod carried_groups;
 mod certified_invariants;
 mod convergence;
 mod covariance;

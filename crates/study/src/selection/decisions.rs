@@ -59,14 +59,6 @@ impl DecisionInput<'_> {
                 let rotation = &demand_of(trial, self.demands).situation.spin;
                 (decision(group, kept, trial, self.demands, rotation), decisive_error(trial, self.demands))
             }
-            None if self.demands.iter().any(|demand| demand.scene.carried.is_some()) => (
-                undecided(
-                    group,
-                    kept,
-                    "not judged: a carried body keeps all groups, since its modes are not those of the file (advise judges them by the rate)",
-                ),
-                None,
-            ),
             None => (undecided(group, kept, "no bound or run shows that it can be dropped"), None),
         };
         // The error of W2 alone decides nothing while the stress stiffness of the same order is missing.

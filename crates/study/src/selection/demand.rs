@@ -1,7 +1,7 @@
 //! Demands of a scene, or of one of several load cases, on a body: tolerances, the static responses that a basis must
 //! contain, and those that the selected modes represent (theory section 8).
 
-use super::cases::{Case, PART_OF_BOUNDS, bounded, scenes};
+use super::cases::{Case, bounded, scenes};
 use super::situation::{PointRows, Situation};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -49,8 +49,9 @@ pub(super) struct Demand<'c> {
     pub found: &'c [Diagnostic],
     /// Trials by bounds.
     pub bounds: Vec<Trial>,
-    /// Groups that bounds do not rule out; `None` if bounds rule out no group.
-    pub by_bounds: Option<TermGroups>,
+    /// Groups that bounds do not rule out, and the part of the tolerances that their bound takes; `None` if bounds rule out
+    /// no group.
+    pub by_bounds: Option<(TermGroups, f64)>,
     /// Truncation errors of the body and of its versions before enrichment.
     pub reference_errors: &'c [ReferenceError],
     /// Error of the missing stress stiffness of the spin; `None` if it is a small part of the tolerances or was not measured.
@@ -80,7 +81,7 @@ impl<'c> Demand<'c> {
             loads,
             cases,
             found: &framed.found,
-            by_bounds: bounds.iter().find(|trial| trial.passed()).map(|trial| trial.kept),
+            by_bounds: bounds.iter().find(|trial| trial.passed()).map(|trial| (trial.kept, trial.worst)),
             bounds,
             reference_errors: &[],
             stress_error: None,
@@ -91,7 +92,7 @@ impl<'c> Demand<'c> {
     /// Returns the groups that the body holds and that bounds do not rule out.
     pub(super) fn groups(&self) -> TermGroups {
         let held = self.body.invariants().groups();
-        self.by_bounds.map_or(held, |kept| kept.and(held))
+        self.by_bounds.map_or(held, |(kept, _)| kept.and(held))
     }
 
     pub(super) fn tolerance(&self) -> &'c Tolerance {
@@ -102,13 +103,11 @@ impl<'c> Demand<'c> {
     /// bounds.
     pub(super) fn budget(&self, stress_error: Option<&StressError>) -> f64 {
         let left = ReferenceError::left(self.reference_errors) * StressError::left(stress_error);
-        if self.by_bounds.is_none() {
-            return left;
-        }
+        let Some((_, bound)) = self.by_bounds else { return left };
         // Measured errors are relative to a motion with groups dropped by bounds, which may be larger than that of the
         // whole body by as much as the bounds allow.
         let PerQuantity { deflection, stress, reaction, .. } = self.tolerance().errors;
-        (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
+        (left - bound).max(0.0) / (1.0 + bound * deflection.max(stress).max(reaction))
     }
 
     /// Returns the diagnostic with the name of the load case, if there are several.

@@ -96,6 +96,17 @@ impl<'r> Instant<'r> {
     }
 }
 
+/// Returns the product |q|_m |q''|_m at every instant of the motion `run` of a carried body, with the modal mass m: it bounds
+/// the torque of W3 about a carrier that does not rotate, the integral of u x u'' over the mass.
+pub(super) fn torques_of_w3(body: &FlexBody, scene: &Scene, run: &Recording) -> Vec<f64> {
+    let mass = body.invariants().modal_mass();
+    let length = |x: &[f64]| {
+        let x = Mat::from_fn(x.len(), 1, |j, _| x[j]);
+        (x.transpose() * &mass * &x)[(0, 0)].max(0.0).sqrt()
+    };
+    instants(scene, run).iter().map(|instant| length(instant.q) * length(&instant.acceleration)).collect()
+}
+
 fn instants<'r>(scene: &Scene, run: &'r Recording) -> Vec<Instant<'r>> {
     let instant = |i: usize| {
         let time = run.time[i];

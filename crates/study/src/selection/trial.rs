@@ -1,19 +1,20 @@
 //! Trials of models with fewer terms or modes: by bounds, and by integration.
 
 use super::bounds::{Driven, ErrorBound, Variation};
-use super::dropped_terms::DroppedTerms;
+use super::dropped_terms::{DroppedTerms, torques_of_w3};
 use super::norms::Norms;
 use super::situation::{PointRows, Situation};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Subset, TermGroups};
 use flexbody_linalg::context::Context;
+use flexbody_linalg::largest;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
     ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, RecoveryMeasure, Resolution, Scene,
-    Spin, StressError, Trace, ends_a_run, simulate, trace, trace_at,
+    Spin, StressError, Trace, ends_a_run, reaction_errors, simulate, trace, trace_at,
 };
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use std::f64::consts::TAU;
 
 /// Number of instants per shortest period at which bounds evaluate a motion.
@@ -27,6 +28,15 @@ const MIN_MODE_SHARE: f64 = 0.01;
 
 /// Smallest number of instants at which bounds evaluate a motion, and number of samples for the largest rate of a spin.
 const LEAST_INSTANTS: usize = 500;
+
+/// Returns the mass of a body, and its radius of gyration about the centre of mass.
+fn size_of(body: &FlexBody) -> (f64, f64) {
+    let invariants = body.invariants();
+    let mass = invariants.mass();
+    let about_origin = 0.5 * invariants.inertia().trace() / mass;
+    let about_centre = about_origin - (invariants.first_moment() / mass).norm_squared();
+    (mass, if about_centre > 0.0 { about_centre } else { about_origin }.sqrt())
+}
 
 /// Model with fewer terms or modes, and its errors.
 #[derive(Debug, Clone, PartialEq)]
@@ -232,6 +242,48 @@ impl TrialRuns<'_> {
             Err(reason) => trial.remark = reason,
         }
         trial
+    }
+
+    /// Returns the trial without any group, by bounds, of a body whose carrier does not rotate. `None` in another scene, in one
+    /// with limits of recoveries, for a mass that does not commute with rotations, and if the motion needs too many instants.
+    ///
+    /// Without rotation W1 and W2 act on nothing. W3 changes the torque of the reaction alone, so that the motion of the modes
+    /// is that of the whole body (theory section 7).
+    ///
+    /// # Errors
+    /// The errors of [`simulate`].
+    pub(super) fn beside_resting_carrier(&self, budget: f64) -> Result<Option<Trial>> {
+        let Self { body, scene, situation, .. } = *self;
+        let rests = situation.spin.value == 0.0 && situation.acceleration.value == 0.0;
+        let is_solid = body.invariants().general().is_none();
+        if scene.carried.is_none() || !rests || !is_solid || !scene.requirements.recoveries.is_empty() {
+            return Ok(None);
+        }
+        let Some(run) = self.fine_motion(TermGroups::NONE)? else { return Ok(None) };
+        let Some(own) = &run.reactions else { return Ok(None) };
+        let torques = torques_of_w3(body, scene, &run);
+        let with = |((force, torque), more): (&(Vector3<f64>, Vector3<f64>), f64)| {
+            (*force, torque + Vector3::x() * more)
+        };
+        let whole: Vec<_> = own.iter().zip(torques).map(with).collect();
+        let errors = reaction_errors(&run.time, [own, &whole], size_of(body), &run.extremes);
+        // The torque of the whole body is at least that of the run without the bound.
+        let largest = errors.map_or(0.0, largest);
+        let reaction = if largest < 1.0 { largest / (1.0 - largest) } else { f64::INFINITY };
+        let errors =
+            OutputErrors { reaction: Some(reaction), recovery: None, ..OutputErrors::all(Some(0.0)) };
+        Ok(Some(Trial {
+            kept: TermGroups::NONE,
+            modes: body.n_modes(),
+            multiplications: multiplications(body, TermGroups::NONE),
+            tier: 0,
+            errors: Some(errors),
+            budget,
+            worst: errors.worst(&scene.requirements.tolerance),
+            remark: String::new(),
+            case: None,
+            by_case: Vec::new(),
+        }))
     }
 
     fn bounds(

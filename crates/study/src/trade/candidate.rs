@@ -139,7 +139,7 @@ const MAX_ERROR_OF_GROUPS: f64 = 10.0;
 /// distinguished.
 const PERFECT: f64 = 0.01;
 
-/// Returns the candidates with all modes of a source, the reference first. Bodies that are `carried` keep all groups.
+/// Returns the candidates with all modes of a source, the reference first. Bodies that are `carried` have W2 and W3 only beside W1.
 pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {
@@ -202,11 +202,12 @@ pub(super) fn first_of(order: &[usize], count: usize) -> Vec<usize> {
     modes
 }
 
-/// Restricts candidates to the groups that their source holds, and removes duplicates. Carried bodies keep all groups.
+/// Restricts candidates to the groups that their source holds, and removes duplicates. Carried bodies have W2 and W3 only beside W1.
 fn held(mut all: Vec<Candidate>, sources: &[Source], carried: bool) -> Vec<Candidate> {
     for candidate in &mut all {
         let held = sources[candidate.source].body().groups();
-        candidate.groups = if carried { held } else { candidate.groups.and(held) };
+        let groups = candidate.groups.and(held);
+        candidate.groups = if carried { groups.in_carried_modes() } else { groups };
     }
     let mut distinct: Vec<Candidate> = Vec::with_capacity(all.len());
     for candidate in all {
