@@ -303,15 +303,39 @@ fn theory_and_validation() {
     check("docs/decisions.md", false);
 }
 
-#[test]
-#[ignore = "slow"]
-fn slow_blocks() {
-    for folder in ["docs/start", "docs/how_to", "docs/reference"] {
-        for page in files(folder, &[".md"]) {
-            if blocks(&page, &read(&page)).iter().any(|block| block.has("slow")) {
-                check(&page, true);
-            }
-        }
+/// Pages with slow blocks, each a test of its own, so that they run beside each other.
+mod slow_blocks {
+    use super::{blocks, check, files, read};
+
+    macro_rules! of_pages {
+        ($($name:ident: $page:literal,)*) => {
+            const PAGES: &[&str] = &[$($page),*];
+            $(#[test]
+            #[ignore = "slow"]
+            fn $name() {
+                check($page, true);
+            })*
+        };
+    }
+
+    of_pages! {
+        tour: "docs/start/tour.md",
+        frame: "docs/how_to/frame.md",
+        known_error: "docs/how_to/known_error.md",
+        rotor: "docs/how_to/rotor.md",
+        satellite: "docs/how_to/satellite.md",
+        select: "docs/reference/select.md",
+        trade: "docs/reference/trade.md",
+    }
+
+    #[test]
+    fn every_page_has_its_test() {
+        let folders = ["docs/start", "docs/how_to", "docs/reference"];
+        let pages = folders.into_iter().flat_map(|folder| files(folder, &[".md"]));
+        let slow: Vec<String> =
+            pages.filter(|page| blocks(page, &read(page)).iter().any(|block| block.has("slow"))).collect();
+        assert_eq!(slow.len(), PAGES.len());
+        assert!(slow.iter().all(|page| PAGES.contains(&page.as_str())), "{slow:?}");
     }
 }
 
