@@ -31,6 +31,12 @@ impl Scene {
         LoadCases::read_single(path, name).map(|case| Self(case.into()))
     }
 
+    /// Returns the scene with its standard variations as a requirement: a body that is made for it holds in these motions too.
+    /// The key `robust` of a scene file does the same.
+    pub fn robust(self) -> Self {
+        Self(self.0.robust())
+    }
+
     /// Reads the text of a scene file with all its load cases. Files of histories are found in `folder`. A scene without a
     /// name is called `scene`.
     ///

@@ -356,6 +356,10 @@ pub struct TradeArguments {
     /// Load case of the scene, by name [default: all; the worst case of a candidate counts]
     #[arg(long, value_name = "NAME", requires = "scene", help_heading = SCENE)]
     pub case: Option<String>,
+    /// Require that the body holds in the standard variations of the scene too: loads turned by 10 degrees, 10 % larger, 10 %
+    /// faster
+    #[arg(long, help_heading = SCENE)]
+    pub robust: bool,
     /// Reference of the errors: full, the body with all modes and groups, for a model with twice the modes and residual
     /// vectors; nodal, the unreduced equations (models only)
     #[arg(long, value_parser = names::reference(), default_value = ReferenceChoice::default().name(), help_heading = COST)]
@@ -403,6 +407,10 @@ pub struct SelectArguments {
     /// Load case of the scene, by name [default: all, which one body must serve]
     #[arg(long, value_name = "NAME", requires = "scene", help_heading = SCENE)]
     pub case: Option<String>,
+    /// Require that the body holds in the standard variations of the scene too: loads turned by 10 degrees, 10 % larger, 10 %
+    /// faster
+    #[arg(long, help_heading = SCENE)]
+    pub robust: bool,
     /// For a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = MODES)]
     pub modes: Option<u32>,

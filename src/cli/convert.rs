@@ -17,7 +17,7 @@ use super::resources::{context, peak_memory_bytes, resident_bytes, use_threads};
 use super::slepc::Slepc;
 use super::terminal::{Watcher, body_text};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::Result;
+use flexbody_base::error::{Error, Result};
 use flexbody_base::output::OutputSlot;
 use flexbody_body::convert::Conversion;
 use flexbody_eigen::PlannedAttempt;
@@ -82,7 +82,10 @@ impl ConversionRun {
     /// # Errors
     /// FB801 for options that cannot be read; the errors of the manifest and of the scene.
     fn new(arguments: &ConvertArguments) -> Result<Self> {
-        let read = |path| LoadCases::read(path, arguments.case.as_deref());
+        let read = |path| {
+            let cases = LoadCases::read(path, arguments.case.as_deref())?;
+            Ok::<_, Error>(if arguments.robust { cases.robust() } else { cases })
+        };
         Ok(Self {
             request: arguments.request()?,
             schemes: lumping_schemes(&arguments.lumped)?,

@@ -29,6 +29,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         flexbody_file::prepare_output(candidate_path(folder, 0))?;
     }
     let cases = run.read_cases(scene, arguments.case.as_deref())?;
+    let cases = if arguments.robust { cases.robust() } else { cases };
     let study = if is_model {
         let (_, model) = run.read_model(body, &arguments.job)?;
         request.for_model(&model, &cases, || run.context(arguments.allow_long))?

@@ -111,6 +111,10 @@ pub struct ConvertArguments {
     /// Load case of the scene, by name [default: all, which one body must serve]
     #[arg(long, value_name = "NAME", requires = "scene", help_heading = SCENE)]
     pub case: Option<String>,
+    /// Require that the body holds in the standard variations of the scene too: loads turned by 10 degrees, 10 % larger, 10 %
+    /// faster
+    #[arg(long, requires = "scene", help_heading = SCENE)]
+    pub robust: bool,
     /// Modes and terms that are stated instead of selected.
     #[command(flatten)]
     pub stated: StatedArguments,

@@ -3,8 +3,8 @@
 use super::{Axes, History, Requirements, VectorHistory};
 use crate::dynamics::{RotationVector, Terms};
 use flexbody_base::provenance::SourceFile;
+use flexbody_linalg::ties::first_largest;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
-use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 /// A scene: initial state, loads and prescribed motion of a body, and settings of its simulation.
@@ -371,6 +371,12 @@ impl Drive {
         }
     }
 
+    fn history_mut(&mut self) -> &mut VectorHistory {
+        match self {
+            Self::Displacement(history) | Self::Velocity(history) | Self::Acceleration(history) => history,
+        }
+    }
+
     /// Returns velocity and acceleration at a time.
     pub fn at(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
         match self {
@@ -386,8 +392,11 @@ impl Drive {
 
 // Variations of a scene: motions that a body is judged on and was not made for.
 
-/// Factor of the angular velocities in the standard variation of a scene.
-const STANDARD_SPEED: f64 = 1.2;
+/// Factor of loads and of angular velocities in standard variations: near the scene, as inputs of a simulation are known.
+const STANDARD_FACTOR: f64 = 1.1;
+
+/// Angle of the turns in standard variations. Unit: degree.
+const STANDARD_TURN: f64 = 10.0;
 
 /// Variation of a load case.
 #[derive(Debug, Clone, PartialEq)]
@@ -406,8 +415,10 @@ pub enum Variations {
     /// None, and the standard ones are not wanted either: a scene that was not read from a file.
     #[default]
     Without,
-    /// None: the standard variations are used.
+    /// None: the standard variations are used, and tell what other motions would need.
     Standard,
+    /// None, with `robust = true`: a body has to hold in the standard variations.
+    Robust,
     /// Variations of the file.
     Stated(Vec<SceneVariation>),
 }
@@ -486,9 +497,14 @@ impl Scene {
     /// Returns the scene with one load, or all of them, turned; a named load has no direction and stays.
     fn with_turned_loads(&self, load: Option<usize>, rotation: &Matrix3<f64>) -> Self {
         let mut scene = self.with_loads(load, |history| history.turned(rotation));
-        let named = scene.loads.iter_mut().zip(&self.loads).filter(|(load, _)| load.is_named());
-        named.for_each(|(load, unchanged)| load.clone_from(unchanged));
+        scene.keep_named_loads(self);
         scene
+    }
+
+    /// Sets the named loads to those of `unchanged`, a scene with the same list of loads.
+    fn keep_named_loads(&mut self, unchanged: &Self) {
+        let named = self.loads.iter_mut().zip(&unchanged.loads).filter(|(load, _)| load.is_named());
+        named.for_each(|(load, unchanged)| load.clone_from(unchanged));
     }
 
     /// Returns the scene with the histories of one load, or of all, replaced by `change` of each.
@@ -505,68 +521,64 @@ impl Scene {
         scene
     }
 
-    /// Returns the standard variations of the scene for a body of 2 or 3 dimensions, each with its name: the loads, or
-    /// without loads the prescribed translation, along the other axes, and angular velocities that are 20 % higher.
+    /// Returns the standard variations of the scene for a body of 2 or 3 dimensions, each with its name. They stay near the
+    /// scene: the loads, or without loads the prescribed translation, turned by [`STANDARD_TURN`] and multiplied by
+    /// [`STANDARD_FACTOR`], and angular velocities multiplied by it.
     ///
-    /// In space the loads are turned by 120 and 240 degrees about (1, 1, 1), which takes each axis to the next; in the
-    /// plane by 90 degrees.
+    /// In space the turns are about the two axes across the main direction of the loads, in the plane about its normal.
     pub(super) fn standard_variations(&self, dimension: usize) -> Vec<(String, Scene)> {
-        let (axis, turns) = match dimension {
-            2 => (Vector3::z_axis(), &[("turned by 90 degrees", 0.25)][..]),
-            _ => {
-                let diagonal = Unit::new_normalize(Vector3::repeat(1.0));
-                (diagonal, &[("turned from x to y", 1.0 / 3.0), ("turned from x to z", 2.0 / 3.0)][..])
-            }
-        };
         let mut all = Vec::new();
-        for (name, turn) in turns {
-            let rotation = permuted(Rotation3::from_axis_angle(&axis, TAU * turn).matrix());
+        let percent = (100.0 * (STANDARD_FACTOR - 1.0)).round();
+        for axis in self.axes_across(dimension) {
+            let normal = Unit::new_unchecked(Vector3::ith(axis, 1.0));
+            let rotation = Rotation3::from_axis_angle(&normal, STANDARD_TURN.to_radians());
+            let about =
+                if dimension == 2 { String::new() } else { format!(" about {}", ["x", "y", "z"][axis]) };
             all.extend(
-                self.turned_excitation(&rotation).map(|(what, scene)| (format!("{what} {name}"), scene)),
+                self.varied_excitation(|history| history.turned(rotation.matrix()))
+                    .map(|(what, scene)| (format!("{what} turned by {STANDARD_TURN} degrees{about}"), scene)),
             );
         }
+        let larger = self.varied_excitation(|history| history.scaled(STANDARD_FACTOR));
+        all.extend(larger.map(|(what, scene)| (format!("{what} larger by {percent} %"), scene)));
         let is_driven = self.rotation().is_some_and(|history| !history.is_nothing());
         if is_driven || self.initial.angular_velocity != Vector3::zeros() {
-            let faster = self.changed(&Change::Speed(STANDARD_SPEED));
-            all.push(("20 % faster".to_owned(), faster));
+            all.push((format!("{percent} % faster"), self.changed(&Change::Speed(STANDARD_FACTOR))));
         }
         all
     }
 
-    /// Returns the scene with its loads turned or, without loads, with its prescribed translation turned. Returns `None`
-    /// if it has neither.
-    fn turned_excitation(&self, rotation: &Matrix3<f64>) -> Option<(&'static str, Scene)> {
+    /// Returns the axes of the standard turns: in the plane its normal, in space the two along which the excitation is
+    /// smaller, by the sum of its main directions.
+    fn axes_across(&self, dimension: usize) -> Vec<usize> {
+        if dimension == 2 {
+            return vec![2];
+        }
+        let forces = self.loads.iter().filter(|load| !load.is_named()).map(|load| &load.force);
+        let carried = self.carried.as_ref().and_then(|carried| carried.translation.as_ref());
+        let mut along = Vector3::<f64>::zeros();
+        for history in forces.chain(carried.map(Drive::history)) {
+            along += history.main_direction().unwrap_or_default().abs();
+        }
+        let main = first_largest(0..3, |&axis| along[axis]).unwrap_or(0);
+        (0..3).filter(|axis| *axis != main).collect()
+    }
+
+    /// Returns the scene with its loads changed or, without loads, with its prescribed translation changed. Returns `None`
+    /// if it has neither. A named load has no direction and stays.
+    fn varied_excitation(
+        &self,
+        change: impl Fn(&VectorHistory) -> VectorHistory,
+    ) -> Option<(&'static str, Scene)> {
         let stays = |load: &Load| load.is_named() || load.force.is_nothing() && load.torque.is_nothing();
         if !self.loads.iter().all(stays) {
-            return Some(("loads", self.with_turned_loads(None, rotation)));
+            let mut scene = self.with_loads(None, change);
+            scene.keep_named_loads(self);
+            return Some(("loads", scene));
         }
         let mut scene = self.clone();
-        let drive = scene.carried.as_mut()?.translation.as_mut()?;
-        match drive {
-            Drive::Displacement(way) | Drive::Velocity(way) | Drive::Acceleration(way) => {
-                *way = way.turned(rotation);
-            }
-        }
+        let way = scene.carried.as_mut()?.translation.as_mut()?.history_mut();
+        *way = change(way);
         Some(("translation", scene))
-    }
-}
-
-/// Returns a rotation that permutes axes, without the rounding of its angle.
-fn permuted(rotation: &Matrix3<f64>) -> Matrix3<f64> {
-    rotation.map(f64::round)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn standard_turns_permute_the_axes() {
-        let axis = Unit::new_normalize(Vector3::repeat(1.0));
-        let turned = |turn: f64| permuted(Rotation3::from_axis_angle(&axis, TAU * turn).matrix());
-        assert_eq!(turned(1.0 / 3.0) * Vector3::x(), Vector3::y());
-        assert_eq!(turned(2.0 / 3.0) * Vector3::x(), Vector3::z());
-        let plane = permuted(Rotation3::from_axis_angle(&Vector3::z_axis(), TAU * 0.25).matrix());
-        assert_eq!(plane * Vector3::x(), Vector3::y());
     }
 }

@@ -139,7 +139,7 @@ impl LoadCases {
         match &self.variations {
             Variations::Without => Vec::new(),
             Variations::Stated(stated) => stated.clone(),
-            Variations::Standard => {
+            Variations::Standard | Variations::Robust => {
                 let of_case = |(case, scene): (usize, &Scene)| {
                     let varied = scene.standard_variations(dimension);
                     varied.into_iter().map(move |(name, scene)| SceneVariation { name, case, scene })
@@ -154,9 +154,24 @@ impl LoadCases {
         &self.variations
     }
 
-    /// Returns true if the scene file states its variations, which a body then has to hold in.
+    /// Returns true if the scene file states its variations.
     pub fn states_variations(&self) -> bool {
         matches!(self.variations, Variations::Stated(_))
+    }
+
+    /// Returns true if a body has to hold in the variations: those that the scene file states, or the standard ones of a
+    /// robust scene.
+    pub fn requires_variations(&self) -> bool {
+        matches!(self.variations, Variations::Stated(_) | Variations::Robust)
+    }
+
+    /// Returns the load cases with the standard variations as a requirement, unless the scene file states its own.
+    pub fn robust(self) -> Self {
+        let variations = match self.variations {
+            Variations::Without | Variations::Standard => Variations::Robust,
+            stated => stated,
+        };
+        Self { variations, ..self }
     }
 
     /// Returns the load cases without variations.

@@ -18,7 +18,7 @@ use std::ops::Range;
 use toml::de::DeValue;
 
 pub(super) const TOP: &[&str] =
-    &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case", "variation"];
+    &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case", "variation", "robust"];
 const RUN: &[&str] = &[
     "duration",
     "outputs",

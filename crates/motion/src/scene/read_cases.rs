@@ -22,7 +22,7 @@ const BY_KEY: &[&str] = &["run", "initial", "motion", "attachment", "limits", "t
 const ADDED: &[&str] = &["load", "watch"];
 
 /// Keys that may only appear at the top level, not in a `[[case]]`.
-const ONLY_COMMON: &[&str] = &["case", "cost", "variation"];
+const ONLY_COMMON: &[&str] = &["case", "cost", "variation", "robust"];
 
 /// Reads the load cases of a scene file in its order, one or more, and their variations; a file without `[[case]]` is a
 /// single scene.
@@ -138,6 +138,7 @@ fn merged<'t>(common: &TomlTable<'t>, case: &TomlTable<'t>) -> TomlTable<'t> {
     let mut merged = common.clone();
     merged.remove("case");
     merged.remove("variation");
+    merged.remove("robust");
     merged.remove("name");
     let known = known_keys();
     for (key, value) in case {
@@ -232,7 +233,10 @@ fn variations(
     tables: &[TomlTable<'_>],
     cases: &[Scene],
 ) -> Option<Variations> {
-    let Some(list) = top.get("variation") else { return Some(Variations::Standard) };
+    let is_robust = top.contains_key("robust") && read_requirements::flag(walk, top, "robust", false)?;
+    let Some(list) = top.get("variation") else {
+        return Some(if is_robust { Variations::Robust } else { Variations::Standard });
+    };
     let items = match list.get_ref() {
         DeValue::Array(items) => items.iter().map(as_table).collect::<Option<Vec<_>>>(),
         _ => None,

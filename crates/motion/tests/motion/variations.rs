@@ -62,18 +62,31 @@ fn a_turn_turns_force_and_torque_about_its_axis() {
 }
 
 #[test]
-fn standard_variations_turn_the_loads_and_the_speed() {
+fn standard_variations_stay_near_the_scene() {
     let cases = read(SCENE).expect("a scene");
     assert_eq!(*cases.stated_variations(), Variations::Standard);
+    assert!(!cases.requires_variations() && cases.clone().robust().requires_variations());
     let all = cases.variations(3);
+    let names: Vec<&str> = all.iter().map(|one| one.name.as_str()).collect();
+    // The larger part of the force is along z.
+    let turned = |axis: &str| format!("loads turned by 10 degrees about {axis}");
+    assert_eq!(names, [&*turned("x"), &*turned("y"), "loads larger by 10 %", "10 % faster"]);
     let force = |at: usize| all[at].scene.loads[0].force.at(1.0).0;
-    assert_eq!(
-        [force(0), force(1), force(2)],
-        [[3.0, 1.0, 2.0], [2.0, 3.0, 1.0], [1.0, 2.0, 3.0]].map(Vector3::from)
-    );
-    let rate = all[2].scene.spin.as_ref().expect("a spin").velocity.at(0.0).0;
-    assert!((rate.z - 12.0).abs() < 1e-13, "{rate}");
-    assert_eq!(cases.variations(2).len(), 2);
+    let near = |at: usize, expected: [f64; 3]| {
+        assert!((force(at) - Vector3::from(expected)).norm() < 1e-14, "{at}: {}", force(at));
+    };
+    let (sin, cos) = 10f64.to_radians().sin_cos();
+    near(0, [1.0, 2.0 * cos - 3.0 * sin, 2.0 * sin + 3.0 * cos]);
+    near(1, [cos + 3.0 * sin, 2.0, 3.0 * cos - sin]);
+    near(2, [1.1, 2.2, 3.3]);
+    near(3, [1.0, 2.0, 3.0]);
+    let rate = all[3].scene.spin.as_ref().expect("a spin").velocity.at(0.0).0;
+    assert!((rate.z - 11.0).abs() < 1e-13, "{rate}");
+    assert_eq!(cases.variations(2).len(), 3);
+    // A robust scene has the same variations, as a requirement.
+    let robust = read(&format!("robust = true\n{SCENE}")).expect("a scene");
+    let of_robust: Vec<String> = robust.variations(3).into_iter().map(|one| one.name).collect();
+    assert!(robust.requires_variations() && of_robust == names);
     // A scene that was not read from a file has none.
     assert!(LoadCases::from(cases[0].clone()).variations(3).is_empty());
     // A body that only falls freely has nothing to vary.

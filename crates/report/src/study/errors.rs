@@ -2,9 +2,10 @@
 
 use crate::notation::numbers::{counted, significant};
 use flexbody_base::numbers::joined_runs;
+use flexbody_body::flex_body::{TermGroup, TermGroups};
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::reference::{MAX_REFERENCE_ERROR, ReferenceError};
-use flexbody_study::selection::VariedSelection;
+use flexbody_study::selection::{EnoughParts, VariedSelection};
 #[cfg(feature = "hdf5")]
 use flexbody_study::trade::{InCase, Trade, TradeVariation};
 use serde::Serialize;
@@ -138,12 +139,45 @@ pub(super) struct VariationFacts<'a> {
     case: Option<&'a str>,
     /// True if the scene file states the variation; false for a standard one.
     stated: bool,
+    /// True if the recommended body must hold in it.
+    required: bool,
     holds: bool,
     errors: Option<OutputErrors>,
     /// Largest ratio of error to tolerance; `None` if the simulation stopped.
     worst: Option<f64>,
     /// Part of the tolerances that the truncation error of the reference takes.
     reference: Option<f64>,
+    /// Fewest parts found with which the body would hold; of a selection that need not hold and does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    enough: Option<EnoughFacts>,
+}
+
+/// Parts of a body that hold in a variation.
+#[derive(Debug, Clone, Serialize)]
+struct EnoughFacts {
+    /// Number of modes.
+    modes: usize,
+    /// Groups of terms.
+    terms: Vec<&'static str>,
+    /// True if these are more groups than the recommended ones.
+    #[serde(skip)]
+    has_more_terms: bool,
+}
+
+impl EnoughFacts {
+    fn new(own: &EnoughParts, chosen: TermGroups) -> Self {
+        let terms = TermGroup::ALL.into_iter().filter(|group| own.groups.has(*group));
+        Self {
+            modes: own.modes,
+            terms: terms.map(TermGroup::name).collect(),
+            has_more_terms: own.groups != chosen,
+        }
+    }
+
+    fn in_words(&self) -> String {
+        let modes = counted(self.modes, "mode");
+        if self.has_more_terms { format!("{modes} with {}", groups_in_words(&self.terms)) } else { modes }
+    }
 }
 
 impl<'a> VariationFacts<'a> {
@@ -152,10 +186,12 @@ impl<'a> VariationFacts<'a> {
             name: &own.name,
             case: own.case.as_deref(),
             stated: own.is_stated,
+            required: own.is_required,
             holds: own.holds(),
             errors: own.chosen.errors,
             worst: Some(own.chosen.worst).filter(|worst| worst.is_finite()),
             reference: own.reference_errors.last().map(|reference_errors| reference_errors.worst),
+            enough: own.enough.as_ref().map(|enough| EnoughFacts::new(enough, own.chosen.kept)),
         }
     }
 
@@ -170,12 +206,31 @@ impl<'a> VariationFacts<'a> {
             name: &one.name,
             case: one.case.as_deref(),
             stated: one.is_stated,
+            required: one.is_required,
             holds: one.accepts(own.as_ref()),
             errors: own.map(|own| own.errors),
             worst: own.map(|own| own.worst),
             reference: one.reference.as_ref().map(|own| own.worst),
+            enough: None,
         };
         trade.variations.iter().zip(&varied.by_variation).map(facts).collect()
+    }
+
+    /// Returns the error of the body in a motion that it need not hold in, and what would hold there.
+    fn if_it_happens(&self) -> String {
+        let Self { name, worst, enough, .. } = self;
+        if !self.is_judged() {
+            return format!(
+                "{name}: not known, since the body with all its modes differs from the FE model by {} of the tolerances there",
+                part_in_words(self.reference.filter(|part| part.is_finite()))
+            );
+        }
+        let Some(worst) = worst else { return format!("{name}: the simulation stops") };
+        let part = format!("{name}: {} % of the tolerances", significant(100.0 * worst, 2));
+        match enough {
+            Some(enough) => format!("{part} ({} would hold)", enough.in_words()),
+            None => part,
+        }
     }
 
     fn is_judged(&self) -> bool {
@@ -188,6 +243,10 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
     let count = variations.len();
     if count == 0 {
         return None;
+    }
+    if variations.iter().all(|one| !one.required) {
+        let all: Vec<String> = variations.iter().map(VariationFacts::if_it_happens).collect();
+        return Some(format!("if the motion differs: {}", all.join("; ")));
     }
     let kind = if variations[0].stated { "stated" } else { "standard" };
     let of = |which: &dyn Fn(&&VariationFacts<'_>) -> bool| -> Vec<&VariationFacts<'_>> {

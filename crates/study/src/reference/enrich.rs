@@ -156,7 +156,7 @@ pub fn varied_errors(
     }
     let error = |one: &SceneVariation| {
         let estimate = Estimate::new(model, body, &one.scene, PART_OF_REFERENCE, context);
-        let estimate = if cases.states_variations() { estimate } else { unless_stopped(estimate, None) };
+        let estimate = if cases.requires_variations() { estimate } else { unless_stopped(estimate, None) };
         let estimate = estimate.map_err(|error| error.about(format!("variation `{}`", one.name)))?;
         Ok(estimate.map(|own| own.error).into_iter().collect())
     };

@@ -8,6 +8,7 @@ mod decisions;
 mod demand;
 mod dropped_terms;
 mod norms;
+mod ranking;
 mod search;
 mod select;
 mod significance;
@@ -26,6 +27,6 @@ pub use select::{CaseSelection, Selection, rule_out, select, select_judged};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};
-pub use variations::VariedSelection;
 #[cfg(feature = "hdf5")]
 pub(crate) use variations::stops;
+pub use variations::{EnoughParts, VariedSelection};

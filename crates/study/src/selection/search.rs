@@ -4,8 +4,9 @@
 use super::cases::{Case, SLACK_OF_RANGE, sets_in, together, worst};
 use super::choice::Choice;
 use super::demand::{BEYOND_BAND, Demand};
+use super::ranking::{by_weight, weights};
 use super::situation::PointRows;
-use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
+use super::trial::{Trial, TrialRuns, multiplications};
 use super::variations::{VariedRuns, VariedSelection};
 use crate::reference::PART_OF_REFERENCE;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -13,10 +14,8 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::FREE_MODE;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
-use flexbody_linalg::ties::{TIE_MARGIN, descending, first_largest};
-use flexbody_motion::scene::{
-    Axes, History, LoadCases, Measure, Scene, StressError, Tolerance, Trace, VectorHistory,
-};
+use flexbody_linalg::ties::{TIE_MARGIN, first_largest};
+use flexbody_motion::scene::{Axes, History, LoadCases, Measure, Scene, StressError, Trace, VectorHistory};
 use std::f64::consts::TAU;
 
 /// Trials and current choice of a selection.
@@ -129,7 +128,7 @@ impl<'s> SelectionState<'s> {
         let mut reason = self.search(&search)?;
         if let Some(varied) = varied {
             context.phase("variations");
-            reason = self.judge(&search, varied, cases_with_variations, reason)?;
+            reason = self.judge(varied, cases_with_variations, reason)?;
         }
         self.measure_choice(&search)?;
         Ok(reason)
@@ -203,21 +202,18 @@ impl<'s> SelectionState<'s> {
         Ok(format!("the fewest modes whose motion is within {within}"))
     }
 
-    /// Judges the choice on variations, adds terms and modes until it holds there, and returns the reason for the modes.
-    fn judge(
-        &mut self,
-        search: &SelectionSearch<'_>,
-        varied: &VariedRuns<'_>,
-        cases: &LoadCases,
-        reason: String,
-    ) -> Result<String> {
+    /// Judges the choice on variations, and returns the reason for the modes. Terms and modes are added until it holds there if
+    /// the variations are required.
+    fn judge(&mut self, varied: &VariedRuns<'_>, cases: &LoadCases, reason: String) -> Result<String> {
         let is_limited = self.demands[0].scene.requirements.multiplications.is_some();
         let held = self.demands[0].body.groups();
-        let ranked = search.ranked(&mut self.choice);
         let modes = self.choice.modes.clone();
-        self.choice.keep(modes.clone());
+        if !cases.requires_variations() {
+            self.varied = varied.tell(&self.choice, held, cases)?;
+            return Ok(reason);
+        }
         let groups = self.choice.groups;
-        self.varied = varied.judge(&mut self.choice, &ranked, held, is_limited, cases)?;
+        self.varied = varied.judge(&mut self.choice, held, is_limited, cases)?;
         self.groups_of_variations = self.choice.groups.and(groups.complement());
         self.diagnostics.extend(self.varied.iter().filter_map(VariedSelection::warning));
         if modes == self.choice.modes {
@@ -255,27 +251,6 @@ impl<'s> SelectionState<'s> {
 /// kept modes, they may take all of it.
 const PART_OF_TERMS: f64 = 0.5;
 
-/// Returns the contribution of each mode relative to the tolerances: the largest of deflection, stress and recoveries.
-fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
-    let weight = |share: &ModeShare| {
-        let plain =
-            (share.deflection / tolerance.errors.deflection).max(share.stress / tolerance.errors.stress);
-        share.recovery.map_or(plain, |recovery| plain.max(recovery))
-    };
-    shares.iter().map(weight).collect()
-}
-
-/// Contribution of a mode relative to the tolerances up to which it counts as zero: the error of the integration, not
-/// the motion, ranks such modes. A larger value ranks small contributions by frequency.
-const NEGLIGIBLE_WEIGHT: f64 = 1e-4;
-
-/// Returns the modes by descending weight, modes of equal or negligible weight by frequency.
-fn by_weight(weights: &[f64]) -> Vec<usize> {
-    let counted: Vec<f64> =
-        weights.iter().map(|&weight| if weight < NEGLIGIBLE_WEIGHT { 0.0 } else { weight }).collect();
-    descending(&counted)
-}
-
 /// Returns the modes of a body by their contribution to its motion, largest first. [`select`](super::select) keeps
 /// modes in this order. `cases` holds, for each load case, the body in its frame, the scene and the motion; the largest
 /// contribution relative to the tolerances of any case counts.
@@ -311,7 +286,7 @@ struct SelectionSearch<'s> {
     pub cases: &'s [TestedCase<'s>],
     /// Groups that must be kept: a run that turns slower than its scene allows cannot show that a term may be dropped.
     pub fixed: TermGroups,
-    /// True if the body is carried in a load case; all groups are then kept.
+    /// True if the body is carried in a load case; W2 and W3 are then kept only beside W1.
     pub carried: bool,
 }
 

@@ -77,7 +77,7 @@ impl Selection {
     /// and missing stress stiffness take at most half of the tolerances each, also in every stated variation. True if nothing
     /// was measured.
     pub fn holds(&self) -> bool {
-        let in_variations = self.varied.iter().all(|one| one.holds() || !one.is_stated);
+        let in_variations = self.varied.iter().all(|one| one.holds() || !one.is_required);
         let is_reference = self.reference_errors.last().is_none_or(ReferenceError::is_reference)
             && self.stress_error.as_ref().is_none_or(StressError::is_small);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
@@ -105,14 +105,11 @@ pub struct CaseSelection {
 }
 
 /// Returns decisions about the groups that I0 and the eigenvalues alone rule out (tier 0) in these load cases. `body`
-/// may hold no groups. Empty if no group is ruled out, or if the body is carried.
+/// may hold no groups. Empty if no group is ruled out.
 ///
 /// # Errors
 /// FB212 if a scene does not match the body; the errors of [`simulate`](flexbody_motion::scene::simulate).
 pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Result<Vec<TermDecision>> {
-    if cases.iter().any(|scene| scene.carried.is_some()) {
-        return Ok(Vec::new());
-    }
     let framed_cases = framed_cases(body, cases)?;
     let demands = demands(&framed_cases, cases, context, false)?;
     let passed = |(at, demand): (usize, &Demand<'_>)| {

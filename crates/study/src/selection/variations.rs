@@ -3,6 +3,7 @@
 use super::cases::Case;
 use super::choice::Choice;
 use super::demand::FramedTests;
+use super::ranking::{by_weight, weights};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -18,16 +19,30 @@ pub struct VariedSelection {
     pub name: String,
     /// Name of the load case that it varies; `None` for a single scene.
     pub case: Option<String>,
-    /// True if the scene file states the variation, so that the model must hold in it; false for a standard one.
+    /// True if the scene file states the variation; false for a standard one.
     pub is_stated: bool,
+    /// True if the model must hold in the variation: a stated one, or a standard one of a robust scene.
+    pub is_required: bool,
     /// The selected model in the variation, measured against the whole body.
     pub chosen: Trial,
     /// The model that the scene alone would select; `None` if it is the selected one.
     pub of_scene: Option<Trial>,
     /// The groups that the scene alone would select, with all modes; `None` unless these groups fail in a variation.
     pub with_all_modes: Option<Trial>,
+    /// Smallest model found that holds in the variation; `None` if the selected model does, if the variation is required, or
+    /// if the whole body is no reference there.
+    pub enough: Option<EnoughParts>,
     /// Truncation errors of the whole body in the variation; empty if no model is at hand.
     pub reference_errors: Vec<ReferenceError>,
+}
+
+/// Parts of a body that suffice in a variation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EnoughParts {
+    /// Number of modes, those of the largest contribution to the scene.
+    pub modes: usize,
+    /// Groups.
+    pub groups: TermGroups,
 }
 
 impl VariedSelection {
@@ -37,9 +52,9 @@ impl VariedSelection {
         self.chosen.passed() && self.reference_errors.last().is_none_or(ReferenceError::is_reference)
     }
 
-    /// Returns the warning about a model that does not hold; `None` if it does, or if the variation is a standard one.
+    /// Returns the warning about a model that does not hold; `None` if it does, or if it need not.
     pub(super) fn warning(&self) -> Option<Diagnostic> {
-        if self.holds() || !self.is_stated {
+        if self.holds() || !self.is_required {
             return None;
         }
         let message = match self.reference_errors.last().filter(|own| !own.is_reference()) {
@@ -67,10 +82,6 @@ pub(super) struct VariedRuns<'v> {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Factor by which the number of modes grows from trial to trial. A smaller value finds fewer modes and takes more
-/// simulations.
-const GROWTH: f64 = 1.25;
-
 impl<'v> VariedRuns<'v> {
     /// Simulates the whole body in every variation. `reference_errors` are its truncation errors there. Unless the scene
     /// file states the variations, one whose simulation stops is left out.
@@ -96,7 +107,7 @@ impl<'v> VariedRuns<'v> {
             let motion = case.runs().motion(tests.body.groups());
             match motion {
                 Ok((motion, _)) => runs.references.push(motion),
-                Err(error) => match stops(&error, one).filter(|_| !cases.states_variations()) {
+                Err(error) => match stops(&error, one).filter(|_| !cases.requires_variations()) {
                     Some(note) => {
                         runs.diagnostics.push(note);
                         continue;
@@ -125,30 +136,113 @@ impl<'v> VariedRuns<'v> {
         self.cases.iter().zip(measures).enumerate().map(trial).collect()
     }
 
-    /// Judges `choice`. Unless the scene limits the cost, modes in the order `ranked` are added until the model is within
-    /// the tolerances of every variation; before, all groups of `held` if those of `choice` are not enough even with all
-    /// modes. Returns the errors in each variation.
+    /// Returns the measures of all variations. They look at all nodes and instants of the references: made once for all
+    /// models.
+    fn measures(&self) -> Vec<Measure<'_>> {
+        let both = self.cases.iter().zip(&self.references);
+        both.map(|(case, reference)| Measure::new(case.body, case.scene, reference)).collect()
+    }
+
+    /// Returns the modes of `choice`, then the others by their contribution to the motion in some of the variations, largest
+    /// first.
+    fn order(&self, choice: &Choice, of: &[usize], measures: &[Measure<'_>]) -> Vec<usize> {
+        let mut weight: Vec<f64> = Vec::new();
+        for &at in of {
+            let runs = self.cases[at].runs();
+            let own = weights(&runs.shares(measures[at].trace()), &runs.scene.requirements.tolerance);
+            weight.resize(own.len(), 0.0);
+            weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
+        }
+        let others = by_weight(&weight).into_iter().filter(|mode| choice.modes.binary_search(mode).is_err());
+        choice.modes.iter().copied().chain(others).collect()
+    }
+
+    /// Measures `choice` in each variation. Where it does not hold, looks for the fewest further modes with which its groups
+    /// hold there, or else all groups of `held`.
+    pub(super) fn tell(
+        &self,
+        choice: &Choice,
+        held: TermGroups,
+        cases: &LoadCases,
+    ) -> Result<Vec<VariedSelection>> {
+        let measures = self.measures();
+        let tell = |(at, chosen): (usize, Trial)| {
+            let reference_errors = self.reference_errors[at].to_vec();
+            let is_reference = reference_errors.last().is_none_or(ReferenceError::is_reference);
+            let enough = if chosen.passed() || !is_reference {
+                None
+            } else {
+                self.enough(at, &measures, choice, held)?
+            };
+            Ok(VariedSelection {
+                name: self.variations[at].name.clone(),
+                case: cases.case_name(self.variations[at].case).map(str::to_owned),
+                is_stated: false,
+                is_required: false,
+                chosen,
+                of_scene: None,
+                with_all_modes: None,
+                enough,
+                reference_errors,
+            })
+        };
+        self.measured(&measures, choice)?.into_iter().enumerate().map(tell).collect()
+    }
+
+    /// Returns the fewest modes, those of `choice` among them, with which the model holds in the variation `at`: by bisection
+    /// with the groups of `choice` or, if these fail with all modes, with those of `held`. `None` if everything is not enough.
+    fn enough(
+        &self,
+        at: usize,
+        measures: &[Measure<'_>],
+        choice: &Choice,
+        held: TermGroups,
+    ) -> Result<Option<EnoughParts>> {
+        let ranked = self.order(choice, &[at], measures);
+        let budget = ReferenceError::left(self.reference_errors[at]);
+        let passes = |count: usize, groups: TermGroups| -> Result<bool> {
+            let mut modes = ranked[..count].to_vec();
+            modes.sort_unstable();
+            Ok(self.cases[at].runs().measured(&measures[at], &modes, groups, budget)?.0.passed())
+        };
+        let sets: &[TermGroups] = if choice.groups == held { &[held] } else { &[choice.groups, held] };
+        for &groups in sets {
+            if !passes(ranked.len(), groups)? {
+                continue;
+            }
+            // The modes of the choice with its own groups have failed.
+            let fewest = choice.modes.len();
+            let (mut too_few, mut enough) =
+                (if groups == choice.groups { fewest } else { fewest - 1 }, ranked.len());
+            while too_few + 1 < enough {
+                let count = too_few.midpoint(enough);
+                if passes(count, groups)? { enough = count } else { too_few = count }
+            }
+            return Ok(Some(EnoughParts { modes: enough, groups }));
+        }
+        Ok(None)
+    }
+
+    /// Judges `choice`. Unless the scene limits the cost, modes are added in the order of their contribution to the variations
+    /// until the model is within the tolerances of each; before, all groups of `held` if those of `choice` are not enough even
+    /// with all modes. Returns the errors in each variation.
     pub(super) fn judge(
         &self,
         choice: &mut Choice,
-        ranked: &[usize],
         held: TermGroups,
         is_limited: bool,
         cases: &LoadCases,
     ) -> Result<Vec<VariedSelection>> {
-        // The measures look at all nodes and instants of the references: made once for all models.
-        let both = self.cases.iter().zip(&self.references);
-        let measures: Vec<Measure<'_>> =
-            both.map(|(case, reference)| Measure::new(case.body, case.scene, reference)).collect();
+        let measures = self.measures();
+        let ranked = self.order(choice, &(0..self.cases.len()).collect::<Vec<_>>(), &measures);
         let of_scene = self.measured(&measures, choice)?;
         let mut chosen = of_scene.clone();
         let passed = |trials: &[Trial]| trials.iter().all(Trial::passed);
-        let mut count = choice.modes.len();
         let mut with_all_modes = None;
         if !is_limited && !passed(&chosen) && choice.groups != held {
             // Groups are at fault only if they fail with all modes.
             let modes = choice.modes.clone();
-            choice.keep_most(ranked, ranked.len());
+            choice.keep_most(&ranked, ranked.len());
             let whole = self.measured(&measures, choice)?;
             choice.keep(modes);
             if !passed(&whole) {
@@ -157,9 +251,15 @@ impl<'v> VariedRuns<'v> {
                 with_all_modes = Some(whole);
             }
         }
-        while !is_limited && !passed(&chosen) && count < ranked.len() {
-            count = ((count as f64 * GROWTH).ceil() as usize).min(ranked.len());
-            choice.keep_most(ranked, count);
+        if !is_limited && !passed(&chosen) {
+            // Errors nearly always decrease with more modes: bisect, and keep the smallest number that passed.
+            let (mut too_few, mut enough) = (choice.modes.len(), ranked.len());
+            while too_few + 1 < enough {
+                let count = too_few.midpoint(enough);
+                choice.keep_most(&ranked, count);
+                if passed(&self.measured(&measures, choice)?) { enough = count } else { too_few = count }
+            }
+            choice.keep_most(&ranked, enough);
             chosen = self.measured(&measures, choice)?;
         }
         let is_changed = chosen != of_scene;
@@ -167,9 +267,11 @@ impl<'v> VariedRuns<'v> {
             name: self.variations[at].name.clone(),
             case: cases.case_name(self.variations[at].case).map(str::to_owned),
             is_stated: cases.states_variations(),
+            is_required: true,
             chosen,
             of_scene: is_changed.then_some(before),
             with_all_modes: with_all_modes.as_ref().map(|all: &Vec<Trial>| all[at].clone()),
+            enough: None,
             reference_errors: self.reference_errors[at].to_vec(),
         };
         Ok(chosen.into_iter().zip(of_scene).enumerate().map(row).collect())

@@ -224,6 +224,8 @@ pub struct Varied {
     pub variations: Vec<SceneVariation>,
     /// True if the scene file states the variations; false for the standard ones.
     pub are_stated: bool,
+    /// True if a recommended body must hold in the variations: stated ones, or those of a robust scene.
+    pub are_required: bool,
     /// Reference of the variations, made for them, followed by every source of the study related to it. Empty if the
     /// sources of the study serve as they are, as those of a flex-body file do.
     pub sources: Vec<Source>,
@@ -239,6 +241,7 @@ impl Varied {
         Self {
             variations: cases.variations(dimension),
             are_stated: cases.states_variations(),
+            are_required: cases.requires_variations(),
             ..Self::default()
         }
     }
@@ -251,8 +254,10 @@ pub struct TradeVariation {
     pub name: String,
     /// Name of the load case that it varies; `None` for a single scene.
     pub case: Option<String>,
-    /// True if the scene file states the variation, so that a recommended body must hold in it; false for a standard one.
+    /// True if the scene file states the variation; false for a standard one.
     pub is_stated: bool,
+    /// True if a recommended body must hold in the variation.
+    pub is_required: bool,
     /// Tolerances.
     pub tolerance: Tolerance,
     /// Part of the tolerances that the truncation error of the reference takes.
@@ -302,7 +307,7 @@ impl<'j> Judge<'j> {
             let case = StudyCase::new(sources, &one.scene, Some(one.name.clone()), None, reserved, context);
             let case = match case {
                 Ok(case) => case,
-                Err(error) => match stops(&error, one).filter(|_| !varied.are_stated) {
+                Err(error) => match stops(&error, one).filter(|_| !varied.are_required) {
                     Some(note) => {
                         diagnostics.push(note);
                         continue;
@@ -314,6 +319,7 @@ impl<'j> Judge<'j> {
                 name: one.name.clone(),
                 case: names.get(one.case).cloned().flatten(),
                 is_stated: varied.are_stated,
+                is_required: varied.are_required,
                 tolerance: case.scene.requirements.tolerance,
                 reserved,
                 reference: varied.reference_errors.get(at).and_then(|rounds| rounds.last()).cloned(),
@@ -334,16 +340,19 @@ impl<'j> Judge<'j> {
     }
 
     /// Judges rows until one holds in the scene and in all variations, the cheapest first, and returns that row. Without
-    /// one, or if the scene limits the cost, returns the row that the scene alone recommends.
+    /// one, if the scene limits the cost, or if the variations are not required, returns the row that the scene alone
+    /// recommends, judged too.
     pub(super) fn recommend(
         &self,
         rows: &mut [TradeRow],
         in_scene: Recommendation,
         context: &Context<'_>,
     ) -> Result<Recommendation> {
+        let is_required = self.variations.iter().any(|one| one.is_required);
         let (wanted, is_limited) = match in_scene {
             Recommendation::None => return Ok(in_scene),
             Recommendation::MostAccurate(row) => (vec![row], true),
+            Recommendation::Cheapest(row) if !is_required => (vec![row], true),
             Recommendation::Cheapest(_) => (front::holding(rows), false),
         };
         // The measures look at all nodes and instants of the references: made once for all candidates.

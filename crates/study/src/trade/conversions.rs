@@ -2,7 +2,9 @@
 
 use super::{Source, Varied};
 use crate::recipe::{ConversionRecipe, Recipe, SceneBasis};
-use crate::reference::{Enriched, Enrichment, MotionBodies, ReferenceError, enrich, enrich_from};
+use crate::reference::{
+    Enriched, Enrichment, MotionBodies, ReferenceError, enrich, enrich_from, varied_errors,
+};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -247,8 +249,9 @@ impl<'m> ConversionContext<'m> {
         Ok((source, conversion.diagnostics))
     }
 
-    /// Makes the reference of the variations: the reference of the study, made by `finest` with the static `responses`,
-    /// enriched further for the variations. All sources of the study are related to it.
+    /// Makes the reference of the variations: the reference of the study, made by `finest` with the static `responses`. For
+    /// required variations it is enriched further, and all sources of the study are related to it; for others it stays as it
+    /// is, with its error there.
     fn varied(
         &self,
         finest: &BodySettings,
@@ -264,20 +267,23 @@ impl<'m> ConversionContext<'m> {
         };
         self.context.phase("reference of the variations");
         let make = |loads: &Mat<f64>| Ok(self.make(finest, loads, Vec::new())?.0);
-        let are_stated = cases.states_variations();
-        let enrichment = Enrichment { grows: true, is_fine: false, passes_over_stopped: !are_stated };
+        if !cases.requires_variations() {
+            let reference_errors = varied_errors(self.model, sources[0].body(), cases, &self.context)?;
+            return Ok(Varied { variations, reference_errors, ..Varied::default() });
+        }
+        let enrichment = Enrichment { grows: true, is_fine: false, passes_over_stopped: false };
         let Enriched { made, rounds: reference_errors } =
             enrich_from(responses, self.model, &scenes, enrichment, &self.context, make, Source::body)?;
         let warning = |(one, rounds): (&SceneVariation, &Vec<ReferenceError>)| {
             let warning = rounds.last()?.warning(&one.scene, enrichment.enough())?;
             Some(warning.about(format!("variation `{}`", one.name)))
         };
-        let diagnostics =
-            variations.iter().zip(&reference_errors).filter_map(warning).filter(|_| are_stated).collect();
+        let diagnostics = variations.iter().zip(&reference_errors).filter_map(warning).collect();
         let related = |source: &Source| source.clone().beside(made.body(), self.model).expect(OF_THE_MODEL);
         let related: Vec<Source> = sources.iter().map(related).collect();
         let sources = std::iter::once(made).chain(related).collect();
-        Ok(Varied { variations, are_stated, sources, reference_errors, diagnostics })
+        let are_stated = cases.states_variations();
+        Ok(Varied { variations, are_stated, are_required: true, sources, reference_errors, diagnostics })
     }
 
     /// Makes bodies of shapes of the motion of `reference` in `cases`: for all candidate numbers of shapes, and for the

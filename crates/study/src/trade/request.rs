@@ -62,7 +62,7 @@ impl TradeStudy {
             |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
         let is_reference =
             (is_nodal || self.reference_errors.iter().all(is_reference)) && self.trade.is_stressed();
-        self.trade.recommended.row().is_some() && is_reference && self.trade.holds_in_stated_variations()
+        self.trade.recommended.row().is_some() && is_reference && self.trade.holds_in_required_variations()
     }
 
     /// Returns the command that makes exactly the recommended candidate from the inputs of `origin`; `None` if nothing is

@@ -82,7 +82,8 @@ pub struct Trade {
     pub rows: Vec<TradeRow>,
     /// Rows of the Pareto front, ascending in cost.
     pub front: Vec<usize>,
-    /// Recommended row: the cheapest that holds in the scene and in its variations or, without one, in the scene alone.
+    /// Recommended row: the cheapest that holds in the scene and in the variations that it requires or, without one, in the
+    /// scene alone.
     pub recommended: Recommendation,
     /// Row that the scene alone would recommend.
     pub in_scene: Recommendation,
@@ -122,11 +123,11 @@ impl Trade {
         self.cases.iter().filter_map(|case| case.stress_error.as_ref()).all(StressError::is_small)
     }
 
-    /// Returns true if the recommended row holds in all variations that the scene file states, or if it states none.
-    pub fn holds_in_stated_variations(&self) -> bool {
+    /// Returns true if the recommended row holds in all required variations.
+    pub fn holds_in_required_variations(&self) -> bool {
         let recommended = self.recommended.row().and_then(|row| self.rows[row].outcome.as_ref().ok());
-        let is_stated = self.variations.iter().any(|one| one.is_stated);
-        !is_stated || recommended.is_none_or(Measured::holds_in_variations)
+        let are_required = self.variations.iter().any(|one| one.is_required);
+        !are_required || recommended.is_none_or(Measured::holds_in_variations)
     }
 
     /// Returns the tolerances of a load case (from 0).

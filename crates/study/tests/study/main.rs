@@ -13,6 +13,7 @@ mod recovery_limits;
 mod reference;
 mod scene_frames;
 mod selection_bounds;
+mod selection_carried;
 mod selection_verdicts;
 mod skewed_beam;
 mod stresses_in_motion;

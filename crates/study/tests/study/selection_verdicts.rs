@@ -158,7 +158,8 @@ fn variations_add_groups_only_where_modes_are_not_enough() {
         let (end, start) = (4.0 * period, 3.0 * period);
         let text = format!(
             "[run]\nduration = {end:e}\ntolerance = 1e-8\n[initial]\ndeformation = \"static\"\n[tolerance]\ndeflection = 0.02\nstress = 0.02\n\
-             [[load]]\nnode = {node}\nforce = [{size:e}, 0, 0]\naxes = \"body\"\nhistory = {{ to = 1, duration = {start:e} }}\n"
+             [[load]]\nnode = {node}\nforce = [{size:e}, 0, 0]\naxes = \"body\"\nhistory = {{ to = 1, duration = {start:e} }}\n\
+             [[variation]]\nname = \"across\"\nturn = {{ axis = [0, 0, 1], degrees = 90 }}\n"
         );
         let cases = LoadCases::parse(&text, Path::new("pushed.toml")).expect("a scene");
         let selection = select(body, &[], &cases, &Context::QUIET).expect("a selection");
