@@ -135,8 +135,8 @@ codes! {
         "The scene names modes, interfaces or amplitudes that the body does not have.";
     SceneContradicts = "FB213", Error, BadInput, "scene contradicts itself", "remove one of the two entries",
         "Two entries of the scene determine one quantity in different ways.";
-    CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried at this place", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with all terms",
-        "The body can be carried only by a place with a position and a rotation, and the inertia terms must all be in the file.";
+    CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried at this place", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with W1",
+        "The body can be carried only by a place with a position and a rotation, and its W2 and W3 depend on W1, which must then be in the file.";
     SeriesColumn = "FB215", Error, BadInput, "column of a history is not in the file", "name a column of the file, or give its number, from 1",
         "The scene or the command asks for a column that the header of the history file does not have.";
     SeriesRow = "FB216", Error, BadInput, "history file cannot be read as columns over time", "write one row per instant, with ascending times and decimal points",

@@ -30,6 +30,8 @@ const SMALLEST: f64 = 16.0 * f64::EPSILON;
 pub struct Explicit {
     tolerance: f64,
     longest: f64,
+    /// Longest step from a state whose rates are all zero.
+    longest_at_rest: f64,
     /// Unit of the grid of step lengths.
     unit: Option<f64>,
     /// Length proposed by the step control for the next step.
@@ -60,6 +62,7 @@ impl Explicit {
         Self {
             tolerance,
             longest,
+            longest_at_rest: longest,
             unit: None,
             proposed: None,
             rates: vec![zeros(); ALL_STAGES],
@@ -71,6 +74,12 @@ impl Explicit {
             interpolates: false,
             work: Work::default(),
         }
+    }
+
+    /// Allows steps of at most `longest` from a state at rest, whose rates are all zero: no oscillation limits them. A step
+    /// in which something begins to move is judged by its stages, as any other.
+    pub fn longest_at_rest(self, longest: f64) -> Self {
+        Self { longest_at_rest: longest, ..self }
     }
 
     /// Returns the work done so far.
@@ -113,11 +122,13 @@ impl Explicit {
                 if first >= end - time { first } else { self.on_grid(first) }
             }
         };
+        let rests = self.rates[0].iter().all(|rate| *rate == 0.0);
+        let longest = if rests { self.longest_at_rest } else { self.longest };
         let mut grow = MAX_STEP_FACTOR;
         loop {
             // A remainder too short for a step of its own is split between two steps.
             let left = end - time;
-            let (h, until) = match length.min(self.longest) {
+            let (h, until) = match length.min(longest) {
                 h if h >= left * (1.0 - SMALLEST) => (left, end),
                 h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
                 h => (h, time + h),

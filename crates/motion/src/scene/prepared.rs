@@ -134,7 +134,9 @@ impl<'a> Prepared<'a> {
         let mut method = match self.scheme {
             Scheme::Adaptive { tolerance } => {
                 let longest = longest_step(self.body, self.scene, self.duration);
-                Method::Explicit(Explicit::new(motion.dimension(), tolerance, longest))
+                let at_rest = longest_passing(self.scene, self.duration);
+                let explicit = Explicit::new(motion.dimension(), tolerance, longest);
+                Method::Explicit(explicit.longest_at_rest(at_rest))
             }
             Scheme::Conserving { order, step } => Method::Gauss {
                 method: Gauss::new(motion.dimension(), order),
@@ -273,9 +275,12 @@ fn longest_step(body: &FlexBody, scene: &Scene, duration: f64) -> f64 {
     let in_frame = scene.carried.as_ref().and_then(|_| body.eigenvalues_in_frame());
     let eigenvalues = in_frame.as_ref().unwrap_or(&body.modes().eigenvalue);
     let fastest = eigenvalues.iter().copied().fold(0.0, f64::max).sqrt();
-    duration
-        .min(1.0 / (STEPS_PER_OSCILLATION * fastest_history(scene, duration)))
-        .min(SAFELY_STABLE / fastest)
+    longest_passing(scene, duration).min(SAFELY_STABLE / fastest)
+}
+
+/// Returns the longest step that passes over no oscillation of a history of a scene that lasts `duration`.
+fn longest_passing(scene: &Scene, duration: f64) -> f64 {
+    duration.min(1.0 / (STEPS_PER_OSCILLATION * fastest_history(scene, duration)))
 }
 
 /// Lower bound of the number of steps of an integration.

@@ -181,6 +181,29 @@ fn no_step_passes_over_a_jump() {
     assert!(run(explicit(), &[jump]) < 1e-14);
 }
 
+/// An oscillator of 1000 rad per time that rests until a force begins is passed in a few steps, and then follows the closed form.
+#[test]
+fn rest_is_passed_in_long_steps() {
+    let (rate, start, end) = (1e3, 0.7, 0.71);
+    let run = |explicit: Explicit| {
+        let mut method = Method::Explicit(explicit);
+        let mut system = Equation::new(4, |time, y: &[f64], rates: &mut [f64]| {
+            let force = if time < start { 0.0 } else { 1.0 };
+            rates.copy_from_slice(&[y[1], rate * rate * (force - y[0]), 0.0, 0.0]);
+        });
+        let mut state = [0.0; 4];
+        integrate(&mut method, &mut system, &mut state, &[0.0, end], &[start], |_, _| Ok::<(), Failure>(()))
+            .expect("an oscillation");
+        (method.work().steps, state[0])
+    };
+    let explicit = || Explicit::new(4, 1e-10, 5.8 / rate);
+    let ((all, along), (few, own)) = (run(explicit()), run(explicit().longest_at_rest(1.0)));
+    let expected = 1.0 - (rate * (end - start)).cos();
+    assert!((own - expected).abs() < 1e-7 && (along - expected).abs() < 1e-7, "{own} {along} {expected}");
+    // The stability of the oscillation alone would take 120 steps until the force begins.
+    assert!(few + 100 < all, "{all} and {few} steps");
+}
+
 /// A table and its run may end at times that differ by rounding.
 #[test]
 fn breaks_a_few_roundings_apart_stop_nothing() {
