@@ -84,7 +84,7 @@ impl ConversionRun {
     fn new(arguments: &ConvertArguments) -> Result<Self> {
         let read = |path| {
             let cases = LoadCases::read(path, arguments.case.as_deref())?;
-            Ok::<_, Error>(if arguments.robust { cases.robust() } else { cases })
+            Ok::<_, Error>(cases.robust_if(arguments.robust))
         };
         Ok(Self {
             request: arguments.request()?,
@@ -219,8 +219,8 @@ impl ConversionRun {
         let phases = watcher.finish();
         refuse_warnings(self.printing, &diagnostics)?;
         let mut run = run_data(output, conversion, diagnostics.clone(), phases);
-        // Reading may have taken more memory than the work will.
         run.offered_stiffness = made.offered_stiffness.names();
+        // Reading may have taken more memory than the work will.
         run.memory_estimate_bytes =
             conversion.plan.as_ref().map(|plan| peak.unwrap_or(0).max(resident + plan.bytes()));
         let facts = Facts::new(&conversion.body, &run);

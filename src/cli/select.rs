@@ -12,8 +12,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let SelectArguments { body, scene, .. } = arguments;
     let is_model = is_model(body, &arguments.job)?;
     let mut run = Run::begin(arguments.printing, [body, scene], None, &arguments.report)?.with_progress();
-    let cases = run.read_cases(scene, arguments.case.as_deref())?;
-    let cases = if arguments.robust { cases.robust() } else { cases };
+    let cases = run.read_cases(scene, arguments.case.as_deref())?.robust_if(arguments.robust);
     let request = SelectionRequest {
         modes: arguments.modes.map(|modes| modes as usize),
         scene_file: Some(scene.clone()),

@@ -28,8 +28,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         // A folder that cannot be written to is noticed before the study.
         flexbody_file::prepare_output(candidate_path(folder, 0))?;
     }
-    let cases = run.read_cases(scene, arguments.case.as_deref())?;
-    let cases = if arguments.robust { cases.robust() } else { cases };
+    let cases = run.read_cases(scene, arguments.case.as_deref())?.robust_if(arguments.robust);
     let study = if is_model {
         let (_, model) = run.read_model(body, &arguments.job)?;
         request.for_model(&model, &cases, || run.context(arguments.allow_long))?

@@ -76,7 +76,7 @@ impl Tailoring {
         let Self { settings, .. } = self;
         let grows = settings.modes.accuracy != Accuracy::Certified
             && settings.basis.with_motion(&Mat::new()).is_some();
-        let enrichment = Enrichment { grows, is_fine, passes_over_stopped: false };
+        let enrichment = Enrichment { grows, is_fine };
         enrich(model, cases, enrichment, context, make, |made| &made.body)
     }
 

@@ -7,7 +7,8 @@ use flexbody_base::error::Result;
 use nalgebra::Vector3;
 
 /// Bound of the relative change of stiffness by the stress of a spin w, over (w / Omega_1)^2, for a body without an estimate.
-/// The true coefficient is 0.3 to 3.4 on nine solids and 200 random blocks, plates and frames, and 2.5 or less about 95 % of their axes.
+/// The true coefficient is 0.3 to 3.4 on nine solids and 200 random blocks, plates and frames, and 2.5 or less about 95 % of
+/// their axes.
 const STRESS_COEFFICIENT: f64 = 2.5;
 
 impl FlexBody {

@@ -473,7 +473,7 @@ impl Scene {
         match change {
             Change::Turn { axis, angle, load } => {
                 let rotation = Rotation3::from_axis_angle(axis, *angle);
-                self.with_turned_loads(*load, rotation.matrix())
+                self.with_directed_loads(*load, |history| history.turned(rotation.matrix()))
             }
             Change::Scale { factor, load } => self.with_loads(*load, |history| history.scaled(*factor)),
             Change::Move { load, to } => {
@@ -494,17 +494,16 @@ impl Scene {
         }
     }
 
-    /// Returns the scene with one load, or all of them, turned; a named load has no direction and stays.
-    fn with_turned_loads(&self, load: Option<usize>, rotation: &Matrix3<f64>) -> Self {
-        let mut scene = self.with_loads(load, |history| history.turned(rotation));
-        scene.keep_named_loads(self);
-        scene
-    }
-
-    /// Sets the named loads to those of `unchanged`, a scene with the same list of loads.
-    fn keep_named_loads(&mut self, unchanged: &Self) {
-        let named = self.loads.iter_mut().zip(&unchanged.loads).filter(|(load, _)| load.is_named());
+    /// Returns the scene of [`Scene::with_loads`], except that named loads stay: they have no direction.
+    fn with_directed_loads(
+        &self,
+        load: Option<usize>,
+        change: impl Fn(&VectorHistory) -> VectorHistory,
+    ) -> Self {
+        let mut scene = self.with_loads(load, change);
+        let named = scene.loads.iter_mut().zip(&self.loads).filter(|(load, _)| load.is_named());
         named.for_each(|(load, unchanged)| load.clone_from(unchanged));
+        scene
     }
 
     /// Returns the scene with the histories of one load, or of all, replaced by `change` of each.
@@ -572,9 +571,7 @@ impl Scene {
     ) -> Option<(&'static str, Scene)> {
         let stays = |load: &Load| load.is_named() || load.force.is_nothing() && load.torque.is_nothing();
         if !self.loads.iter().all(stays) {
-            let mut scene = self.with_loads(None, change);
-            scene.keep_named_loads(self);
-            return Some(("loads", scene));
+            return Some(("loads", self.with_directed_loads(None, change)));
         }
         let mut scene = self.clone();
         let way = scene.carried.as_mut()?.translation.as_mut()?.history_mut();

@@ -174,6 +174,11 @@ impl LoadCases {
         Self { variations, ..self }
     }
 
+    /// Returns the load cases, [robust](Self::robust) if `is_robust`.
+    pub fn robust_if(self, is_robust: bool) -> Self {
+        if is_robust { self.robust() } else { self }
+    }
+
     /// Returns the load cases without variations.
     pub fn without_variations(self) -> Self {
         Self { variations: Variations::Without, ..self }

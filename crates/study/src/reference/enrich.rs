@@ -30,8 +30,6 @@ pub struct Enrichment {
     /// True if the truncation error must be within [`PART_OF_FINE`] of the tolerances, instead of
     /// [`PART_OF_REFERENCE`].
     pub is_fine: bool,
-    /// True if a load case whose simulation stops asks for nothing, as a standard variation may; false if it is an error.
-    pub passes_over_stopped: bool,
 }
 
 impl Enrichment {
@@ -102,10 +100,7 @@ pub fn enrich_from<B>(
     let (enough, most_rounds) = (enrichment.enough(), enrichment.most_rounds());
     for round in 0..=most_rounds {
         context.phase("error of the reference");
-        let estimate = |scene: &Scene| {
-            let found = Estimate::new(model, body(&made), scene, enough, context);
-            if enrichment.passes_over_stopped { unless_stopped(found, None) } else { found }
-        };
+        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, context);
         let estimates = cases.iter().map(estimate).collect::<Result<Vec<_>>>()?;
         if estimates.iter().all(Option::is_none) {
             break;

@@ -87,20 +87,20 @@ impl Grid {
     pub(super) fn new(body: &FlexBody, scene: &Scene, motion: &Trace, duration: f64) -> Option<Self> {
         let excited = ExcitedRates::new(body, scene, motion, MIN_MODE_SHARE);
         let of_histories = fastest_history(scene, duration);
-        let window = |start: f64, end: f64, around: f64| {
+        let window = |start: f64, end: f64| {
+            let around = PADDING * (end - start);
             let frequency = (excited.between(start - around, end + around) / TAU).max(of_histories);
             Window { start, end, frequency }
         };
-        let frequency = window(0.0, duration, 0.0).frequency;
+        let frequency = window(0.0, duration).frequency;
         let most = (MOST_AMPLITUDES / (body.n_modes() + FORCES)).max(MIN_INTERVALS);
         let stretches = stretches(&scene.breaks(), duration);
         let whole = |(start, end)| Window { start, end, frequency };
         let one_spacing = stretches.iter().copied().map(whole).collect();
         Self::of_windows(one_spacing, most, duration).or_else(|| {
-            let parted = stretches.iter().flat_map(|(start, end)| {
-                let around = PADDING * (end - start);
-                parted(window(*start, *end, around), &window, MOST_HALVINGS)
-            });
+            let parted = stretches
+                .iter()
+                .flat_map(|(start, end)| parted(window(*start, *end), &window, MOST_HALVINGS));
             Self::of_windows(parted.collect(), most, duration)
         })
     }
@@ -161,15 +161,14 @@ impl Grid {
 }
 
 /// Parts a window by halving, at most `halvings` times, where this saves a third of the instants. `window` returns the window
-/// between two times, with the motion in some time around them.
-fn parted(whole: Window, window: &impl Fn(f64, f64, f64) -> Window, halvings: usize) -> Vec<Window> {
+/// between two times.
+fn parted(whole: Window, window: &impl Fn(f64, f64) -> Window, halvings: usize) -> Vec<Window> {
     if halvings == 0 || whole.intervals() <= WORTH_PARTING {
         return vec![whole];
     }
     let Window { start, end, .. } = whole;
-    let around = 0.5 * PADDING * (end - start);
     let middle = 0.5 * (start + end);
-    let halves = [window(start, middle, around), window(middle, end, around)];
+    let halves = [window(start, middle), window(middle, end)];
     let parts: Vec<Window> = halves.into_iter().flat_map(|half| parted(half, window, halvings - 1)).collect();
     let intervals = |windows: &[Window]| windows.iter().map(Window::intervals).sum::<f64>();
     if intervals(&parts) < SAVES * whole.intervals() { parts } else { vec![whole] }
@@ -195,11 +194,12 @@ mod tests {
     /// An oscillation of 1 kHz during 4 ms in the middle of 1 s, beside one of 2 Hz.
     #[test]
     fn a_run_is_parted_where_oscillations_begin_and_end() {
-        let window = |start: f64, end: f64, around: f64| {
+        let window = |start: f64, end: f64| {
+            let around = PADDING * (end - start);
             let is_fast = end + around > 0.5 && start - around < 0.504;
             Window { start, end, frequency: if is_fast { 1e3 } else { 2.0 } }
         };
-        let whole = window(0.0, 1.0, 0.0);
+        let whole = window(0.0, 1.0);
         let parts = parted(whole, &window, MOST_HALVINGS);
         assert_eq!((parts[0].start, parts[parts.len() - 1].end), (0.0, 1.0));
         assert!(parts.windows(2).all(|pair| pair[0].end == pair[1].start));

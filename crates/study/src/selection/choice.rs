@@ -1,5 +1,6 @@
 //! Choice of terms and modes during a selection.
 
+use super::ranking::first_of;
 use super::trial::{ModeShare, Trial};
 use flexbody_body::flex_body::TermGroups;
 
@@ -14,9 +15,7 @@ pub(super) struct Choice {
 impl Choice {
     /// Keeps the first `count` modes of the order `ranked`.
     pub(super) fn keep_most(&mut self, ranked: &[usize], count: usize) {
-        let mut modes = ranked[..count].to_vec();
-        modes.sort_unstable();
-        self.keep(modes);
+        self.keep(first_of(ranked, count));
     }
 
     /// Sets the kept modes.

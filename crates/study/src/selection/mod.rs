@@ -22,6 +22,8 @@ pub use bounds::{
 pub use decisions::{DecisiveError, NOT_JUDGED};
 pub use demand::{BEYOND_BAND, Participation, WantedResponses, largest_eigenvalue, participations};
 pub use norms::Norms;
+#[cfg(feature = "hdf5")]
+pub(crate) use ranking::{fewest, first_of};
 pub use search::most_excited_modes;
 pub use select::{CaseSelection, Selection, rule_out, select, select_judged};
 pub use significance::{Significance, significances};

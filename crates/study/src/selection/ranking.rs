@@ -1,6 +1,7 @@
 //! Ranking of modes by their contribution to a motion.
 
 use super::trial::ModeShare;
+use flexbody_base::error::Result;
 use flexbody_linalg::ties::descending;
 use flexbody_motion::scene::Tolerance;
 
@@ -23,4 +24,28 @@ pub(super) fn by_weight(weights: &[f64]) -> Vec<usize> {
     let counted: Vec<f64> =
         weights.iter().map(|&weight| if weight < NEGLIGIBLE_WEIGHT { 0.0 } else { weight }).collect();
     descending(&counted)
+}
+
+/// Returns the first `count` modes of an order, ascending.
+pub(crate) fn first_of(order: &[usize], count: usize) -> Vec<usize> {
+    let mut modes = order[..count].to_vec();
+    modes.sort_unstable();
+    modes
+}
+
+/// Returns the smallest number above `too_few`, up to `enough`, that passes: by bisection, since errors nearly always decrease
+/// with more modes. `enough` itself is not tried.
+///
+/// # Errors
+/// The errors of `passes`.
+pub(crate) fn fewest(
+    mut too_few: usize,
+    mut enough: usize,
+    mut passes: impl FnMut(usize) -> Result<bool>,
+) -> Result<usize> {
+    while too_few + 1 < enough {
+        let count = too_few.midpoint(enough);
+        if passes(count)? { enough = count } else { too_few = count }
+    }
+    Ok(enough)
 }

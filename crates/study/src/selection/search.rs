@@ -4,7 +4,7 @@
 use super::cases::{Case, SLACK_OF_RANGE, sets_in, together, worst};
 use super::choice::Choice;
 use super::demand::{BEYOND_BAND, Demand};
-use super::ranking::{by_weight, weights};
+use super::ranking::{by_weight, fewest, first_of, weights};
 use super::situation::PointRows;
 use super::trial::{Trial, TrialRuns, multiplications};
 use super::variations::{VariedRuns, VariedSelection};
@@ -361,24 +361,13 @@ impl SelectionSearch<'_> {
     /// Chooses the fewest modes, in the order of their contribution, whose motion is within the tolerances.
     pub(super) fn modes(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
         let ranked = self.ranked(choice);
-        let first = |count: usize| {
-            let mut modes = ranked[..count].to_vec();
-            modes.sort_unstable();
-            modes
-        };
-        // Errors nearly always decrease with more modes: bisect, and keep the smallest number that passed.
-        let (mut too_few, mut enough) = (0, ranked.len());
-        while too_few + 1 < enough {
-            let count = too_few.midpoint(enough);
-            let trial = self.measured(&first(count), choice.groups, 1.0)?;
-            if trial.passed() {
-                enough = count;
-            } else {
-                too_few = count;
-            }
+        let passes = |count: usize| {
+            let trial = self.measured(&first_of(&ranked, count), choice.groups, 1.0)?;
             trials.push(trial);
-        }
-        choice.keep(first(enough));
+            Ok(trials[trials.len() - 1].passed())
+        };
+        let enough = fewest(0, ranked.len(), passes)?;
+        choice.keep_most(&ranked, enough);
         Ok(())
     }
 
@@ -405,8 +394,7 @@ impl SelectionSearch<'_> {
             if fits == 0 {
                 continue;
             }
-            let mut modes = ranked[..fits].to_vec();
-            modes.sort_unstable();
+            let modes = first_of(&ranked, fits);
             // Measure the set with these modes, and keep the most accurate.
             let trial = self.measured(&modes, groups, 1.0)?;
             if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst * (1.0 - TIE_MARGIN)) {

@@ -222,18 +222,7 @@ impl TrialRuns<'_> {
     /// Returns the trial by bounds of a model with the groups `kept`. With its motion `run`, the dropped terms are
     /// evaluated along this motion; without, at the largest motion that loads and rotation allow.
     pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: TermGroups, budget: f64) -> Trial {
-        let mut trial = Trial {
-            kept,
-            modes: self.body.n_modes(),
-            multiplications: multiplications(self.body, kept),
-            tier: norms.tier,
-            errors: None,
-            budget,
-            worst: f64::INFINITY,
-            remark: String::new(),
-            case: None,
-            by_case: Vec::new(),
-        };
+        let mut trial = self.without_errors(kept, norms.tier, budget);
         match self.bounds(norms, run, kept) {
             Ok(errors) => {
                 trial.worst = errors.worst(&self.scene.requirements.tolerance);
@@ -272,18 +261,24 @@ impl TrialRuns<'_> {
         let reaction = if largest < 1.0 { largest / (1.0 - largest) } else { f64::INFINITY };
         let errors =
             OutputErrors { reaction: Some(reaction), recovery: None, ..OutputErrors::all(Some(0.0)) };
-        Ok(Some(Trial {
-            kept: TermGroups::NONE,
-            modes: body.n_modes(),
-            multiplications: multiplications(body, TermGroups::NONE),
-            tier: 0,
-            errors: Some(errors),
+        let worst = errors.worst(&scene.requirements.tolerance);
+        Ok(Some(Trial { errors: Some(errors), worst, ..self.without_errors(TermGroups::NONE, 0, budget) }))
+    }
+
+    /// Returns a trial of the whole body with the groups `kept`, without errors.
+    fn without_errors(&self, kept: TermGroups, tier: u8, budget: f64) -> Trial {
+        Trial {
+            kept,
+            modes: self.body.n_modes(),
+            multiplications: multiplications(self.body, kept),
+            tier,
+            errors: None,
             budget,
-            worst: errors.worst(&scene.requirements.tolerance),
+            worst: f64::INFINITY,
             remark: String::new(),
             case: None,
             by_case: Vec::new(),
-        }))
+        }
     }
 
     fn bounds(

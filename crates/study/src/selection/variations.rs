@@ -3,7 +3,7 @@
 use super::cases::Case;
 use super::choice::Choice;
 use super::demand::FramedTests;
-use super::ranking::{by_weight, weights};
+use super::ranking::{by_weight, fewest, first_of, weights};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -201,8 +201,7 @@ impl<'v> VariedRuns<'v> {
         let ranked = self.order(choice, &[at], measures);
         let budget = ReferenceError::left(self.reference_errors[at]);
         let passes = |count: usize, groups: TermGroups| -> Result<bool> {
-            let mut modes = ranked[..count].to_vec();
-            modes.sort_unstable();
+            let modes = first_of(&ranked, count);
             Ok(self.cases[at].runs().measured(&measures[at], &modes, groups, budget)?.0.passed())
         };
         let sets: &[TermGroups] = if choice.groups == held { &[held] } else { &[choice.groups, held] };
@@ -211,14 +210,9 @@ impl<'v> VariedRuns<'v> {
                 continue;
             }
             // The modes of the choice with its own groups have failed.
-            let fewest = choice.modes.len();
-            let (mut too_few, mut enough) =
-                (if groups == choice.groups { fewest } else { fewest - 1 }, ranked.len());
-            while too_few + 1 < enough {
-                let count = too_few.midpoint(enough);
-                if passes(count, groups)? { enough = count } else { too_few = count }
-            }
-            return Ok(Some(EnoughParts { modes: enough, groups }));
+            let too_few = choice.modes.len() - usize::from(groups != choice.groups);
+            let modes = fewest(too_few, ranked.len(), |count| passes(count, groups))?;
+            return Ok(Some(EnoughParts { modes, groups }));
         }
         Ok(None)
     }
@@ -252,13 +246,10 @@ impl<'v> VariedRuns<'v> {
             }
         }
         if !is_limited && !passed(&chosen) {
-            // Errors nearly always decrease with more modes: bisect, and keep the smallest number that passed.
-            let (mut too_few, mut enough) = (choice.modes.len(), ranked.len());
-            while too_few + 1 < enough {
-                let count = too_few.midpoint(enough);
+            let enough = fewest(choice.modes.len(), ranked.len(), |count| {
                 choice.keep_most(&ranked, count);
-                if passed(&self.measured(&measures, choice)?) { enough = count } else { too_few = count }
-            }
+                Ok(passed(&self.measured(&measures, choice)?))
+            })?;
             choice.keep_most(&ranked, enough);
             chosen = self.measured(&measures, choice)?;
         }

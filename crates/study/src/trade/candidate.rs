@@ -1,6 +1,7 @@
 //! Candidates of a trade study, and the bodies from which they are made.
 
 use crate::recipe::{Origin, Recipe};
+use crate::selection::first_of;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, LumpedBody, MassStructure, Storage, Subset, TermGroup, TermGroups};
@@ -195,14 +196,8 @@ pub(super) fn ladder(
     held(all, sources, carried)
 }
 
-/// Returns the first `count` modes of an order, ascending.
-pub(super) fn first_of(order: &[usize], count: usize) -> Vec<usize> {
-    let mut modes = order[..count].to_vec();
-    modes.sort_unstable();
-    modes
-}
-
-/// Restricts candidates to the groups that their source holds, and removes duplicates. Carried bodies have W2 and W3 only beside W1.
+/// Restricts candidates to the groups that their source holds, and removes duplicates. Carried bodies have W2 and W3 only
+/// beside W1.
 fn held(mut all: Vec<Candidate>, sources: &[Source], carried: bool) -> Vec<Candidate> {
     for candidate in &mut all {
         let held = sources[candidate.source].body().groups();

@@ -72,7 +72,7 @@ pub fn conversions(
         responses.clone_from(loads);
         conversions.make(&finest, loads, ConvertSettings::default().lumped)
     };
-    let enrichment = Enrichment { grows: true, is_fine: fine, passes_over_stopped: false };
+    let enrichment = Enrichment { grows: true, is_fine: fine };
     let enriched = enrich(model, cases, enrichment, context, make, |(made, _)| made.body())?;
     let Enriched { made: (reference, mut diagnostics), rounds: reference_errors } = enriched;
     diagnostics.extend(warnings(cases, &reference_errors, enrichment.enough()));
@@ -271,7 +271,7 @@ impl<'m> ConversionContext<'m> {
             let reference_errors = varied_errors(self.model, sources[0].body(), cases, &self.context)?;
             return Ok(Varied { variations, reference_errors, ..Varied::default() });
         }
-        let enrichment = Enrichment { grows: true, is_fine: false, passes_over_stopped: false };
+        let enrichment = Enrichment { grows: true, is_fine: false };
         let Enriched { made, rounds: reference_errors } =
             enrich_from(responses, self.model, &scenes, enrichment, &self.context, make, Source::body)?;
         let warning = |(one, rounds): (&SceneVariation, &Vec<ReferenceError>)| {

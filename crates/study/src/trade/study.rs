@@ -1,13 +1,13 @@
 //! Trade study: every candidate is simulated, its errors are measured, then its times.
 
-use super::candidate::{first_of, ladder, whole_candidates};
+use super::candidate::{ladder, whole_candidates};
 use super::case::{Judge, StudyCase};
 use super::progress::Progress;
 use super::{
     Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
     TradeRow, TradeVariation, Varied, front,
 };
-use crate::selection::most_excited_modes;
+use crate::selection::{fewest, first_of, most_excited_modes};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
@@ -288,22 +288,16 @@ impl Job<'_> {
         // Largest measured number of modes in this order that does not hold.
         let is_rung = |row: &&TradeRow| row.candidate == with(row.candidate.modes.len());
         let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
-        let (mut too_few, mut enough) =
-            (fewer.map(|row| row.candidate.modes.len()).max().unwrap_or(0), count);
+        let too_few = fewer.map(|row| row.candidate.modes.len()).max().unwrap_or(0);
         context.phase("number of modes");
         // The limits were checked before the first candidate.
         let unlimited = Context { memory: None, ..*context };
-        while too_few + 1 < enough {
-            let count = too_few.midpoint(enough);
+        fewest(too_few, count, |count| {
             let row = self.measure(with(count), &unlimited)?;
             let passed = row.outcome.as_ref().is_ok_and(|measured| measured.holds());
-            if passed {
-                enough = count
-            } else {
-                too_few = count
-            }
             rows.push(row);
-        }
+            Ok(passed)
+        })?;
         Ok(())
     }
 

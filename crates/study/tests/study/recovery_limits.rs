@@ -190,7 +190,7 @@ fn limits_of_recoveries_hold_below_the_least_deflection() {
 
 /// Returns the estimated errors of a body relative to its model.
 fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError {
-    let nothing = Enrichment { grows: false, is_fine: false, passes_over_stopped: false };
+    let nothing = Enrichment { grows: false, is_fine: false };
     let cases = scene.clone().into();
     let found = enrich(model, &cases, nothing, &Context::QUIET, |_| Ok(body.clone()), |body| body);
     found.expect("an estimate").rounds[0].last().expect("an estimate").clone()

@@ -109,7 +109,7 @@ fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError 
     let found = enrich(
         model,
         &scene.clone().into(),
-        Enrichment { grows: false, is_fine: false, passes_over_stopped: false },
+        Enrichment { grows: false, is_fine: false },
         &Context::QUIET,
         |_| Ok(body.clone()),
         |body| body,
