@@ -145,8 +145,10 @@ def measure(flexbody, small, only):
                 absent.append(f"{name}: pip: {missing.name}")
                 print(f"  not found: Python module {missing.name} (pip; --install): skipped")
                 continue
-            except (AssertionError, RuntimeError, ValueError, LookupError, OSError) as error:
+            except (AssertionError, RuntimeError, ValueError, LookupError, OSError, subprocess.CalledProcessError) as error:
                 print(f"  failed: {error!r}")
+                said = getattr(error, "stderr", None) or b""
+                print(said if isinstance(said, str) else said.decode(errors="replace"))
                 rows = [Row(name, where, "runs (1: no)", 1.0, 0.0)]
         for row in rows:
             print(f"  {'good' if row.good() else 'BAD '} {row.found:8.1e} (limit {row.limit:.0e}) {row.what}", flush=True)

@@ -351,7 +351,8 @@ impl UniformStrains {
 /// Returns the answers of an FE program to the six uniform strains (rows x 6); `None` if they are not among its shapes. A
 /// shape is a strain if it is a multiple of it with a rigid motion.
 fn answers(model: &FeModel, fields: &Mat<f64>, shapes: &AnsweredShapes) -> Option<Mat<f64>> {
-    /// Largest difference of a shape from a strain, relative to the shape, by root mean squares.
+    /// Largest difference of a shape from a strain with a rigid motion, relative to the strain, by root mean squares: a rigid
+    /// mode among the shapes is no strain, whatever rounding left in it.
     const MAX_DIFFERENCE: f64 = 1e-4;
     let rows = displacement_rows(model, shapes)?;
     let displacements =
@@ -368,9 +369,9 @@ fn answers(model: &FeModel, fields: &Mat<f64>, shapes: &AnsweredShapes) -> Optio
         let along = gram(columns.as_ref(), displacements.as_ref());
         let fitted = solve_upper(&factor, &solve_lower(&factor, &along));
         let left = &displacements - combine(columns.as_ref(), fitted.as_ref());
+        let size = columns.col(0).norm_l2();
         let is_strain = |c: &usize| {
-            left.col(*c).norm_l2() <= MAX_DIFFERENCE * displacements.col(*c).norm_l2()
-                && fitted[(0, *c)] != 0.0
+            fitted[(0, *c)] != 0.0 && left.col(*c).norm_l2() <= MAX_DIFFERENCE * fitted[(0, *c)].abs() * size
         };
         let shape = (0..left.ncols()).find(is_strain)?;
         Some(
