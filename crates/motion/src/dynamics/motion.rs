@@ -6,6 +6,7 @@ use super::prescribed::Prescribed;
 use super::{Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Snapshot};
 use crate::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3, Vector6};
+use pulp::NullaryFnOnce;
 
 /// Smallest deformation, relative to the size of the body, that the scales assume, so that a body at rest
 /// has a scale.
@@ -513,19 +514,11 @@ impl Evaluation<'_> {
     ) -> Result<(), NotPositiveDefinite> {
         let body = self.equations;
         assert_eq!(q.len(), body.nf, "one coordinate per mode");
-        let (p, h, pi) = body.split(momenta);
+        let (linear, angular, modal) = body.split(momenta);
         self.q.copy_from_slice(q);
-        self.modal.copy_from_slice(pi);
-        self.arch()
-            .dispatch(|| {
-                self.deform();
-                let (velocity, omega) = self.solve(&p, &h, prescribed)?;
-                (self.velocity, self.omega) = (velocity, omega);
-                self.qd.copy_from_slice(&self.modal);
-                self.move_on();
-                Some(())
-            })
-            .ok_or(NotPositiveDefinite)
+        self.modal.copy_from_slice(modal);
+        let arch = self.arch();
+        arch.dispatch(FromMomenta { evaluation: self, linear, angular, prescribed }).ok_or(NotPositiveDefinite)
     }
 
     /// Solves Mc(q) x = (linear, angular, `self.modal`): returns x of V and omega, and writes that of the
@@ -570,5 +563,29 @@ impl Evaluation<'_> {
         }
         body.modal_mass.solve_upper(&mut self.modal)?;
         Some((Vector3::from_fn(|k, _| rigid[k]), Vector3::from_fn(|k, _| rigid[3 + k])))
+    }
+}
+
+/// Sets the velocities and what follows from them, from the linear and angular momentum and those of the modes in `modal`.
+///
+/// A structure, since the compiler leaves a closure of this size outside the function that has the instruction set.
+struct FromMomenta<'s, 'b> {
+    evaluation: &'s mut Evaluation<'b>,
+    linear: Vector3<f64>,
+    angular: Vector3<f64>,
+    prescribed: &'s Prescribed,
+}
+
+impl NullaryFnOnce for FromMomenta<'_, '_> {
+    type Output = Option<()>;
+
+    #[inline(always)]
+    fn call(self) -> Option<()> {
+        let Self { evaluation, linear, angular, prescribed } = self;
+        evaluation.deform();
+        (evaluation.velocity, evaluation.omega) = evaluation.solve(&linear, &angular, prescribed)?;
+        evaluation.qd.copy_from_slice(&evaluation.modal);
+        evaluation.move_on();
+        Some(())
     }
 }

@@ -13,7 +13,7 @@ use flexbody_body::invariants::symmetric_part;
 use flexbody_linalg::ties::sort_descending;
 use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side, subtract_combination};
 use flexbody_motion::scene::Instant;
-use rustfft::FftPlanner;
+use rustfft::{Fft, FftPlanner};
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 
@@ -336,10 +336,11 @@ fn resonances(
     let step = duration / count as f64;
     // Spectrum of the force increments: the root of the elastic energy at each line.
     let combinations = combinations(amplitudes, energy);
+    let fourier = FftPlanner::new().plan_fft_forward(2 * count);
     let mut level = vec![0.0f64; count + 1];
     for j in 0..combinations.nrows() {
         let values: Vec<f64> = (0..combinations.ncols()).map(|i| combinations[(j, i)]).collect();
-        let lines = spectrum(&increments(grid, &values, step, count, settled));
+        let lines = spectrum(&increments(grid, &values, step, count, settled), &*fourier);
         level.iter_mut().zip(&lines).for_each(|(level, line)| *level += line.norm_sqr());
     }
     level.iter_mut().for_each(|level| *level = (0.5 * *level).sqrt());
@@ -404,10 +405,12 @@ fn increments(grid: &Grid, values: &[f64], step: f64, count: usize, settled: boo
 
 /// Returns the Fourier transform of a series padded with as many zeros: the line spacing is half of one period over the
 /// series.
-fn spectrum(series: &[f64]) -> Vec<Complex<f64>> {
+///
+/// * `fourier`: of twice the length of the series.
+fn spectrum(series: &[f64], fourier: &dyn Fft<f64>) -> Vec<Complex<f64>> {
     let mut lines: Vec<Complex<f64>> = series.iter().map(|value| Complex::new(*value, 0.0)).collect();
     lines.resize(2 * series.len(), Complex::default());
-    FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+    fourier.process(&mut lines);
     lines.truncate(series.len() + 1);
     lines
 }
