@@ -274,6 +274,24 @@ impl<'a> Motion<'a> {
         (attitude(state), &state[Layout::MODES..self.layout().linear()])
     }
 
+    /// Returns the roots of the energies that scale the motion at a state: of the whole motion, and of the vibration.
+    fn sizes(&self, state: &[f64]) -> [f64; 2] {
+        let (layout, size) = (self.layout(), &self.size);
+        let body_angular = attitude(state).axes().tr_mul(&vector(state, layout.angular()));
+        let rotation = body_angular.norm() / (size.mass.sqrt() * size.radius);
+        let momenta = &state[layout.modal()..layout.offset()];
+        let vibration = momenta
+            .iter()
+            .zip(&state[Layout::MODES..])
+            .zip(&size.stiffness)
+            .map(|((p, q), stiffness)| p * p + stiffness * q * q)
+            .sum::<f64>()
+            .sqrt();
+        let least = LEAST_DEFORMATION * size.mass.sqrt() * size.radius * size.first_rate;
+        let whole = rotation.max(vibration).max(least);
+        [whole, vibration.max(LEAST_VIBRATION * whole)]
+    }
+
     /// Sets the evaluation; returns the place of the frame and the rates of prescribed motion.
     fn go_to(&mut self, time: f64, state: &[f64]) -> Result<(Place, Prescribed), Failure> {
         let (layout, equations) = (self.layout(), self.evaluation.equations());
@@ -367,20 +385,7 @@ impl System for Motion<'_> {
     /// and impulses follow and are not controlled.
     fn scales(&self, state: &[f64], scales: &mut [f64]) {
         let (layout, size) = (self.layout(), &self.size);
-        let body_angular = attitude(state).axes().tr_mul(&vector(state, layout.angular()));
-        let rotation = body_angular.norm() / (size.mass.sqrt() * size.radius);
-        let momenta = &state[layout.modal()..layout.offset()];
-        let vibration = momenta
-            .iter()
-            .zip(&state[Layout::MODES..])
-            .zip(&size.stiffness)
-            .map(|((p, q), stiffness)| p * p + stiffness * q * q)
-            .sum::<f64>()
-            .sqrt();
-        let least = LEAST_DEFORMATION * size.mass.sqrt() * size.radius * size.first_rate;
-        let whole = rotation.max(vibration).max(least);
-        let vibration = vibration.max(LEAST_VIBRATION * whole);
-
+        let [whole, vibration] = self.sizes(state);
         scales[..Layout::ATTITUDE].fill(size.radius);
         scales[Layout::ATTITUDE..Layout::MODES].fill(1.0);
         for (scale, stiffness) in scales[Layout::MODES..].iter_mut().zip(&size.stiffness) {
@@ -395,6 +400,18 @@ impl System for Motion<'_> {
 
     fn oscillators(&self) -> &[Oscillator] {
         &self.oscillators
+    }
+
+    fn work_entry(&self) -> Option<usize> {
+        Some(self.layout().work())
+    }
+
+    fn follower_scales(&self, state: &[f64], scales: &mut [f64]) {
+        let (layout, size) = (self.layout(), &self.size);
+        let [whole, _] = self.sizes(state);
+        scales[layout.work()] = whole * whole;
+        scales[layout.impulse()..layout.angular_impulse()].fill(whole * size.mass.sqrt());
+        scales[layout.angular_impulse()..].fill(whole * size.mass.sqrt() * size.radius);
     }
 
     fn enter_oscillators(&self, residual: &mut [f64]) {
@@ -518,7 +535,8 @@ impl Evaluation<'_> {
         self.q.copy_from_slice(q);
         self.modal.copy_from_slice(modal);
         let arch = self.arch();
-        arch.dispatch(FromMomenta { evaluation: self, linear, angular, prescribed }).ok_or(NotPositiveDefinite)
+        arch.dispatch(FromMomenta { evaluation: self, linear, angular, prescribed })
+            .ok_or(NotPositiveDefinite)
     }
 
     /// Solves Mc(q) x = (linear, angular, `self.modal`): returns x of V and omega, and writes that of the

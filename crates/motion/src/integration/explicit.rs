@@ -82,6 +82,20 @@ impl Explicit {
         Self { longest_at_rest: longest, ..self }
     }
 
+    /// Returns the longest step, and the longest one from rest.
+    pub(super) fn longest_steps(&self) -> (f64, f64) {
+        (self.longest, self.longest_at_rest)
+    }
+
+    pub(super) fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// Returns the length of the last step; zero without one.
+    pub(super) fn last_length(&self) -> f64 {
+        self.last.map_or(0.0, |[_, _, h]| h)
+    }
+
     /// Returns the work done so far.
     pub fn work(&self) -> Work {
         self.work

@@ -1,6 +1,6 @@
 //! Time loop shared by all integrators: output times, breaks, observers.
 
-use super::{Explicit, Failure, Gauss, System, Work};
+use super::{Adaptive, Explicit, Failure, Gauss, System, Work};
 
 /// Relative difference of lengths that rounding of times explains.
 const STEP_ROUNDING: f64 = 1e-9;
@@ -11,8 +11,10 @@ const BEFORE_BREAK: f64 = 4.0 * f64::EPSILON;
 /// Integration method with its steps.
 #[derive(Debug, Clone)]
 pub enum Method {
-    /// Steps as long as the tolerance allows.
+    /// Steps as long as the tolerance and stability allow.
     Explicit(Explicit),
+    /// Steps as long as the tolerance allows.
+    Adaptive(Box<Adaptive>),
     /// Steps of constant length between two breaks, at most `step`.
     Gauss {
         /// Collocation method.
@@ -27,6 +29,7 @@ impl Method {
     pub fn work(&self) -> Work {
         match self {
             Self::Explicit(method) => method.work(),
+            Self::Adaptive(method) => method.work(),
             Self::Gauss { method, .. } => method.work(),
         }
     }
@@ -34,6 +37,7 @@ impl Method {
     fn restart(&mut self) {
         match self {
             Self::Explicit(method) => method.restart(),
+            Self::Adaptive(method) => method.restart(),
             Self::Gauss { method, .. } => method.restart(),
         }
     }
@@ -50,6 +54,8 @@ pub enum ObserverEvent {
     End,
     /// Point within a step.
     Within,
+    /// Point within a step that the motion alone limits: as far from its neighbours as the ends of other steps may be.
+    Between,
 }
 
 /// Integrates from the first to the last of `instants` and passes the state at each of them to `observe`,
@@ -75,7 +81,7 @@ pub fn integrate<E: From<Failure>>(
 ) -> Result<(), E> {
     integrate_closely(method, system, state, instants, breaks, 1, |event, time, state| match event {
         ObserverEvent::Instant => observe(time, state),
-        ObserverEvent::Start | ObserverEvent::End | ObserverEvent::Within => Ok(()),
+        ObserverEvent::Start | ObserverEvent::End | ObserverEvent::Within | ObserverEvent::Between => Ok(()),
     })
 }
 
@@ -112,7 +118,10 @@ pub fn integrate_closely<E: From<Failure>>(
         let piece = SmoothInterval { from, before: if is_break { just_before(stop) } else { stop } };
         match method {
             Method::Explicit(method) => {
-                explicit_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;
+                dense_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;
+            }
+            Method::Adaptive(method) => {
+                dense_piece(&mut **method, system, state, piece, parts, &mut wanted, &mut observe)?;
             }
             Method::Gauss { method, step } => {
                 gauss_piece(method, *step, system, state, piece, &mut wanted, &mut observe)?;
@@ -164,10 +173,96 @@ impl Wanted<'_> {
     }
 }
 
-/// Integrates over an interval with the explicit method; states at output times and at points within a step
-/// are interpolated.
-fn explicit_piece<E: From<Failure>>(
-    method: &mut Explicit,
+/// Method with states between the ends of its steps.
+trait DenseMethod {
+    /// Takes one step from `time`, at most to `end`, and returns its end.
+    fn step(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        state: &mut [f64],
+        end: f64,
+    ) -> Result<f64, Failure>;
+
+    /// Computes the state at `time` within the last step, which ended in `after`.
+    fn interpolate(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        after: &[f64],
+        state: &mut [f64],
+    ) -> Result<(), Failure>;
+
+    /// Returns the number of parts of the last step to be seen, a multiple of the `parts` of an explicit step.
+    fn parts(&self, parts: usize) -> usize;
+
+    /// Returns true if the motion alone limited the last step.
+    fn is_long(&self) -> bool;
+}
+
+impl DenseMethod for Explicit {
+    fn step(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        state: &mut [f64],
+        end: f64,
+    ) -> Result<f64, Failure> {
+        self.step(system, time, state, end)
+    }
+
+    fn interpolate(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        after: &[f64],
+        state: &mut [f64],
+    ) -> Result<(), Failure> {
+        self.interpolate(system, time, after, state)
+    }
+
+    fn parts(&self, parts: usize) -> usize {
+        parts
+    }
+
+    fn is_long(&self) -> bool {
+        false
+    }
+}
+
+impl DenseMethod for Adaptive {
+    fn step(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        state: &mut [f64],
+        end: f64,
+    ) -> Result<f64, Failure> {
+        self.step(system, time, state, end)
+    }
+
+    fn interpolate(
+        &mut self,
+        system: &mut dyn System,
+        time: f64,
+        after: &[f64],
+        state: &mut [f64],
+    ) -> Result<(), Failure> {
+        self.interpolate(system, time, after, state)
+    }
+
+    fn parts(&self, parts: usize) -> usize {
+        self.parts(parts)
+    }
+
+    fn is_long(&self) -> bool {
+        self.is_long()
+    }
+}
+
+/// Integrates over an interval; states at output times and at points within a step are interpolated.
+fn dense_piece<E: From<Failure>>(
+    method: &mut impl DenseMethod,
     system: &mut dyn System,
     state: &mut [f64],
     piece: SmoothInterval,
@@ -180,6 +275,7 @@ fn explicit_piece<E: From<Failure>>(
     while time < piece.before {
         let end = method.step(system, time, state, piece.before)?;
         finite(state, time)?;
+        let (parts, finer) = (method.parts(parts), method.parts(parts) / parts);
         for part in 1..=parts {
             let place = if part < parts { time + (end - time) * (part as f64 / parts as f64) } else { end };
             while let Some(instant) = wanted.next_before(place) {
@@ -188,7 +284,9 @@ fn explicit_piece<E: From<Failure>>(
             }
             if part < parts {
                 method.interpolate(system, place, state, &mut within)?;
-                observe(ObserverEvent::Within, place, &within)?;
+                let is_between = method.is_long() && part % finer == 0;
+                let event = if is_between { ObserverEvent::Between } else { ObserverEvent::Within };
+                observe(event, place, &within)?;
             }
         }
         observe(ObserverEvent::End, end, state)?;

@@ -25,6 +25,15 @@ pub trait System {
         &[]
     }
 
+    /// Returns the entry of the work that the system takes up, including that of its oscillators; the default has none.
+    fn work_entry(&self) -> Option<usize> {
+        None
+    }
+
+    /// Writes the scales of entries that follow from the others, such as work and impulses, whose scales are infinite for steps
+    /// that resolve every oscillation. The default has none.
+    fn follower_scales(&self, _state: &[f64], _scales: &mut [f64]) {}
+
     /// Replaces a residual of the state by that in the coordinates of the [`Oscillator`]s. The default does nothing: the
     /// oscillators are entries of the state.
     fn enter_oscillators(&self, _residual: &mut [f64]) {}

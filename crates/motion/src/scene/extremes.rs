@@ -1,6 +1,7 @@
 //! Largest values of all quantities over a continuous motion.
 
 use crate::dynamics::{Balance, BodyPoint};
+use crate::integration::ObserverEvent;
 use faer::MatRef;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::{larger, not_negative};
@@ -106,14 +107,22 @@ impl<'b> Survey<'b> {
         self.reaction[1].see(time, torque.norm());
     }
 
-    /// Takes energies and momenta at the end of a step.
-    pub(super) fn see_balance(&mut self, time: f64, balance: &Balance, omega: &Vector3<f64>) {
+    /// Takes energies and momenta at the end of a step, or between the ends of a long one: drift is that of the ends.
+    pub(super) fn see_balance(
+        &mut self,
+        time: f64,
+        balance: &Balance,
+        omega: &Vector3<f64>,
+        event: ObserverEvent,
+    ) {
         let internal = balance.kinetic - balance.flight + balance.elastic;
         self.internal.see(time, internal.max(0.0).sqrt());
         self.spin.see(time, omega.norm());
         self.spin_body.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
         self.spins.see(omega);
-        self.differences.see(balance);
+        if event != ObserverEvent::Between {
+            self.differences.see(balance);
+        }
     }
 
     /// Returns the extremes.

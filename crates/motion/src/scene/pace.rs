@@ -92,7 +92,7 @@ fn advice(body: &FlexBody, scene: &Scene, scheme: Scheme, duration: f64, seconds
         );
     }
     format!(
-        "each run of this scene takes {takes}: {followed} the {periods:.0} periods of the highest mode in {duration} {unit}, at least {by_modes:.0} steps. If only the slow motion matters, method = \"conserving\" with step = {step} in [run] takes {by_motion:.0} steps, in which fast modes follow the loads statically; a body with fewer modes or a shorter `duration` is faster too"
+        "each run of this scene takes {takes}: {followed} the {periods:.0} periods of the highest mode in {duration} {unit}, about {by_modes:.0} steps. If only the slow motion matters, method = \"conserving\" with step = {step} in [run] takes {by_motion:.0} steps, in which fast modes follow the loads statically; a body with fewer modes or a shorter `duration` is faster too"
     )
 }
 

@@ -7,7 +7,9 @@ use crate::dynamics::{
     BodyPoint, Configuration, EquationsOfMotion, Motion, NodalPoint, Orientation, RotationVector,
     Surroundings,
 };
-use crate::integration::{Explicit, Failure, Gauss, Method, ObserverEvent, System, Work, integrate_closely};
+use crate::integration::{
+    Adaptive, Explicit, Failure, Gauss, Method, ObserverEvent, System, Work, integrate_closely,
+};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::numbers::significant;
@@ -17,8 +19,8 @@ use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-/// Number of parts of an explicit step at which the motion is sampled. Stability keeps steps from being
-/// much longer than the period of any mode, so that every oscillation is resolved.
+/// Number of parts of an explicit step at which the motion is sampled. Stability keeps these steps from being much longer than the
+/// period of any mode, and exponential steps have more parts where modes ring, so that every oscillation is resolved.
 pub(super) const PARTS: usize = 6;
 
 /// Body with the damping of its scene, and this scene, in one frame and ready for integration.
@@ -111,7 +113,7 @@ impl<'a> Prepared<'a> {
         let reaction = now.reaction();
         survey.see_reaction(time, &reaction);
         if event != ObserverEvent::Within {
-            survey.see_balance(time, &now.balance(), &now.configuration().omega);
+            survey.see_balance(time, &now.balance(), &now.configuration().omega, event);
         }
         Ok(self.scene.prescribes().then_some(reaction))
     }
@@ -136,7 +138,7 @@ impl<'a> Prepared<'a> {
                 let longest = longest_step(self.body, self.scene, self.duration);
                 let at_rest = longest_passing(self.scene, self.duration);
                 let explicit = Explicit::new(motion.dimension(), tolerance, longest);
-                Method::Explicit(explicit.longest_at_rest(at_rest))
+                Method::Adaptive(Box::new(Adaptive::new(explicit.longest_at_rest(at_rest), &motion)))
             }
             Scheme::Conserving { order, step } => Method::Gauss {
                 method: Gauss::new(motion.dimension(), order),
@@ -304,15 +306,10 @@ impl Effort {
         let mode_in_words =
             format!("the fastest mode oscillates {} times per unit of time", significant(fastest_mode, 4));
         match scene.run.scheme {
+            // Modes limit the steps only while they ring.
             Scheme::Adaptive { .. } => {
-                let for_modes = duration * fastest_mode * TAU / STABLE;
-                let for_histories = duration * fastest_load * STEPS_PER_OSCILLATION;
-                let (steps, because) = if for_histories > for_modes {
-                    (for_histories, load_in_words)
-                } else {
-                    (for_modes, mode_in_words)
-                };
-                Ok((scene.run.scheme, Self { steps, because }))
+                let steps = duration * fastest_load * STEPS_PER_OSCILLATION;
+                Ok((scene.run.scheme, Self { steps, because: load_in_words }))
             }
             Scheme::Conserving { order, step: Some(step) } => {
                 let step = step.min(duration);

@@ -12,6 +12,7 @@ mod dynamics_forms;
 mod dynamics_geometric;
 mod dynamics_loads;
 mod equilibrium;
+mod exponential_steps;
 mod general_equations;
 mod integration;
 mod motion;

@@ -2,8 +2,9 @@
 
 use super::grid::Grid;
 use super::residual::{NodalView, SceneLoad};
+use super::resonances::ResonanceCriteria;
 use super::truncated_motion::{TruncatedMotion, TruncationErrors, energy_scale};
-use super::truncated_responses::{ResonanceCriteria, TruncatedResponses};
+use super::truncated_responses::TruncatedResponses;
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;

@@ -8,6 +8,7 @@ mod grid;
 mod motion_bodies;
 mod principal;
 mod residual;
+mod resonances;
 mod truncated_equations;
 mod truncated_motion;
 mod truncated_responses;

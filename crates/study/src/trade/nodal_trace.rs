@@ -294,7 +294,7 @@ impl<'a> NodalSetup<'a> {
                 taken += 1;
                 taken % refinement == 0
             }
-            ObserverEvent::Instant | ObserverEvent::Within => false,
+            ObserverEvent::Instant | ObserverEvent::Within | ObserverEvent::Between => false,
         })
     }
 
