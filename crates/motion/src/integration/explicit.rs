@@ -140,13 +140,8 @@ impl Explicit {
         let longest = if rests { self.longest_at_rest } else { self.longest };
         let mut grow = MAX_STEP_FACTOR;
         loop {
-            // A remainder too short for a step of its own is split between two steps.
             let left = end - time;
-            let (h, until) = match length.min(longest) {
-                h if h >= left * (1.0 - SMALLEST) => (left, end),
-                h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
-                h => (h, time + h),
-            };
+            let (h, until) = within(time, length.min(longest), end);
             // Breaks may be one rounding apart: the interval between them is one step of any length.
             let too_short = h <= SMALLEST * time.abs() && h < left;
             if h.is_nan() || too_short {
@@ -179,8 +174,7 @@ impl Explicit {
 
     /// Returns the largest length of the grid up to `length`. The first length is the unit of the grid.
     fn on_grid(&mut self, length: f64) -> f64 {
-        let unit = *self.unit.get_or_insert(length);
-        unit * ((LENGTHS_PER_OCTAVE * (length / unit).log2()).floor() / LENGTHS_PER_OCTAVE).exp2()
+        on_grid(*self.unit.get_or_insert(length), length)
     }
 
     /// Computes the state at `time` within the last step, with order 7.
@@ -284,6 +278,22 @@ impl Explicit {
             Ok(()) if pace == 0.0 => longest,
             _ => probe,
         })
+    }
+}
+
+/// Returns the largest length unit 2^(k / 16) up to `length` ([`LENGTHS_PER_OCTAVE`]).
+pub(super) fn on_grid(unit: f64, length: f64) -> f64 {
+    unit * ((LENGTHS_PER_OCTAVE * (length / unit).log2()).floor() / LENGTHS_PER_OCTAVE).exp2()
+}
+
+/// Returns length and end of a step of `length` from `time`, at most to `end`: a remainder too short for a step of its own is
+/// split between two steps.
+pub(super) fn within(time: f64, length: f64, end: f64) -> (f64, f64) {
+    let left = end - time;
+    match length {
+        h if h >= left * (1.0 - SMALLEST) => (left, end),
+        h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
+        h => (h, time + h),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Steps of collocation that solve the oscillators of a system exactly.
 
+use super::explicit::{on_grid, within};
 use super::{Failure, Oscillator, System, Work, free_oscillation};
 use nalgebra::{Matrix2, Vector2};
 
@@ -174,12 +175,7 @@ impl Exponential {
         state: &mut [f64],
         end: f64,
     ) -> Result<Option<f64>, Failure> {
-        let left = end - time;
-        let (h, until) = match self.proposed.min(self.longest) {
-            h if h >= left * (1.0 - 16.0 * f64::EPSILON) => (left, end),
-            h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
-            h => (h, time + h),
-        };
+        let (h, until) = within(time, self.proposed.min(self.longest), end);
         self.find_scales(system, state);
         let continued = self.start(system, time, state)?;
         if !self.find_solvers(h) {
@@ -474,11 +470,6 @@ impl Exponential {
         };
         self.oscillators.iter().map(points).fold(0.0, f64::max)
     }
-}
-
-/// Returns the largest length unit 2^(k / 16) up to `length`: rounding does not change the choice.
-fn on_grid(unit: f64, length: f64) -> f64 {
-    unit * ((16.0 * (length / unit).log2()).floor() / 16.0).exp2()
 }
 
 fn dot(a: &[f64; NODES], b: &[f64; NODES]) -> f64 {

@@ -118,10 +118,12 @@ pub fn integrate_closely<E: From<Failure>>(
         let piece = SmoothInterval { from, before: if is_break { just_before(stop) } else { stop } };
         match method {
             Method::Explicit(method) => {
+                let method = DenseMethod::Explicit(method);
                 dense_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;
             }
             Method::Adaptive(method) => {
-                dense_piece(&mut **method, system, state, piece, parts, &mut wanted, &mut observe)?;
+                let method = DenseMethod::Adaptive(method);
+                dense_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;
             }
             Method::Gauss { method, step } => {
                 gauss_piece(method, *step, system, state, piece, &mut wanted, &mut observe)?;
@@ -174,7 +176,12 @@ impl Wanted<'_> {
 }
 
 /// Method with states between the ends of its steps.
-trait DenseMethod {
+enum DenseMethod<'m> {
+    Explicit(&'m mut Explicit),
+    Adaptive(&'m mut Adaptive),
+}
+
+impl DenseMethod<'_> {
     /// Takes one step from `time`, at most to `end`, and returns its end.
     fn step(
         &mut self,
@@ -182,87 +189,40 @@ trait DenseMethod {
         time: f64,
         state: &mut [f64],
         end: f64,
-    ) -> Result<f64, Failure>;
-
-    /// Computes the state at `time` within the last step, which ended in `after`.
-    fn interpolate(
-        &mut self,
-        system: &mut dyn System,
-        time: f64,
-        after: &[f64],
-        state: &mut [f64],
-    ) -> Result<(), Failure>;
-
-    /// Returns the number of parts of the last step to be seen, a multiple of the `parts` of an explicit step.
-    fn parts(&self, parts: usize) -> usize;
-
-    /// Returns true if the motion alone limited the last step.
-    fn is_long(&self) -> bool;
-}
-
-impl DenseMethod for Explicit {
-    fn step(
-        &mut self,
-        system: &mut dyn System,
-        time: f64,
-        state: &mut [f64],
-        end: f64,
     ) -> Result<f64, Failure> {
-        self.step(system, time, state, end)
+        match self {
+            Self::Explicit(method) => method.step(system, time, state, end),
+            Self::Adaptive(method) => method.step(system, time, state, end),
+        }
     }
 
+    /// Computes the state `within` at `time` within the last step, which ended in `after`.
     fn interpolate(
         &mut self,
         system: &mut dyn System,
         time: f64,
         after: &[f64],
-        state: &mut [f64],
+        within: &mut [f64],
     ) -> Result<(), Failure> {
-        self.interpolate(system, time, after, state)
+        match self {
+            Self::Explicit(method) => method.interpolate(system, time, after, within),
+            Self::Adaptive(method) => method.interpolate(system, time, after, within),
+        }
     }
 
-    fn parts(&self, parts: usize) -> usize {
-        parts
-    }
-
-    fn is_long(&self) -> bool {
-        false
-    }
-}
-
-impl DenseMethod for Adaptive {
-    fn step(
-        &mut self,
-        system: &mut dyn System,
-        time: f64,
-        state: &mut [f64],
-        end: f64,
-    ) -> Result<f64, Failure> {
-        self.step(system, time, state, end)
-    }
-
-    fn interpolate(
-        &mut self,
-        system: &mut dyn System,
-        time: f64,
-        after: &[f64],
-        state: &mut [f64],
-    ) -> Result<(), Failure> {
-        self.interpolate(system, time, after, state)
-    }
-
-    fn parts(&self, parts: usize) -> usize {
-        self.parts(parts)
-    }
-
-    fn is_long(&self) -> bool {
-        self.is_long()
+    /// Returns the number of parts of the last step to be seen, a multiple of the `parts` of an explicit step, and true if the
+    /// motion alone limited that step.
+    fn seen(&self, parts: usize) -> (usize, bool) {
+        match self {
+            Self::Explicit(_) => (parts, false),
+            Self::Adaptive(method) => (method.parts(parts), method.is_long()),
+        }
     }
 }
 
 /// Integrates over an interval; states at output times and at points within a step are interpolated.
 fn dense_piece<E: From<Failure>>(
-    method: &mut impl DenseMethod,
+    mut method: DenseMethod<'_>,
     system: &mut dyn System,
     state: &mut [f64],
     piece: SmoothInterval,
@@ -275,16 +235,17 @@ fn dense_piece<E: From<Failure>>(
     while time < piece.before {
         let end = method.step(system, time, state, piece.before)?;
         finite(state, time)?;
-        let (parts, finer) = (method.parts(parts), method.parts(parts) / parts);
-        for part in 1..=parts {
-            let place = if part < parts { time + (end - time) * (part as f64 / parts as f64) } else { end };
+        let (all, is_long) = method.seen(parts);
+        let finer = all / parts;
+        for part in 1..=all {
+            let place = if part < all { time + (end - time) * (part as f64 / all as f64) } else { end };
             while let Some(instant) = wanted.next_before(place) {
                 method.interpolate(system, instant, state, &mut within)?;
                 observe(ObserverEvent::Instant, instant, &within)?;
             }
-            if part < parts {
+            if part < all {
                 method.interpolate(system, place, state, &mut within)?;
-                let is_between = method.is_long() && part % finer == 0;
+                let is_between = is_long && part % finer == 0;
                 let event = if is_between { ObserverEvent::Between } else { ObserverEvent::Within };
                 observe(event, place, &within)?;
             }

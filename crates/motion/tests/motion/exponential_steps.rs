@@ -172,7 +172,7 @@ fn coupled_motion_is_that_of_explicit_steps() {
     }
 }
 
-/// Where a fast oscillator drives what is not an oscillator, long steps do not pay, and the steps stay explicit.
+/// Steps stay explicit where a fast oscillator drives what is not an oscillator: long ones would not pay.
 #[test]
 fn motion_that_must_be_followed_is_followed() {
     let of = [(1e4, 0.0)];
