@@ -167,8 +167,9 @@ fn motions_selections_and_studies_tell_their_numbers() {
     assert_eq!((last, motion.modal_velocities(last).len()), (20, 6));
     let length: f64 = motion.attitude(last).iter().map(|p| p * p).sum();
     assert!((length - 1.0).abs() < 1e-12 && motion.reaction(last).is_none());
-    // No load acts on the body.
-    assert!(motion.drift().iter().all(|drift| *drift < 1e-6) && motion.work(last).abs() < 1e-12);
+    // No load acts on the body: the work is rounding of the energies that it is the difference of.
+    let (drift, work) = (motion.drift(), motion.work(last) / motion.kinetic_energy(last));
+    assert!(drift.iter().all(|drift| *drift < 1e-6) && work.abs() < 1e-12, "{drift:?}, work {work:e}");
     let path = &motion.paths()[0];
     assert_eq!((path.name.as_str(), path.place.len()), ("interface bolt_wall", 21));
     let deflected =
