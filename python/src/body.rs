@@ -252,8 +252,8 @@ impl Body {
     #[getter]
     fn geometric_stiffness<'py>(&self, py: Python<'py>) -> PyResult<FloatsByName<'py>> {
         let all = PyDict::new(py);
-        for one in self.inner.geometric_stiffness() {
-            all.set_item(one.load, matrix(py, &one.matrix)?)?;
+        for stiffness in self.inner.geometric_stiffness() {
+            all.set_item(stiffness.load, matrix(py, &stiffness.matrix)?)?;
         }
         Ok(all)
     }
@@ -264,8 +264,8 @@ impl Body {
     #[getter]
     fn inertia_stiffness<'py>(&self, py: Python<'py>) -> PyResult<FloatsByName<'py>> {
         let all = PyDict::new(py);
-        for one in self.inner.inertia_stiffness() {
-            all.set_item(one.load, matrix(py, &one.matrix)?)?;
+        for stiffness in self.inner.inertia_stiffness() {
+            all.set_item(stiffness.load, matrix(py, &stiffness.matrix)?)?;
         }
         Ok(all)
     }

@@ -22,7 +22,7 @@ pub struct Check {
 /// Returns identities as a list of `flexbody.Identity`.
 pub fn identities<'py>(py: Python<'py>, all: &[flexbody::Identity]) -> PyResult<Vec<IdentityTuple<'py>>> {
     let class = py.import("flexbody._types")?.getattr("Identity")?;
-    all.iter().map(|one| class.call1((one.name, one.value, one.limit, one.holds))).collect()
+    all.iter().map(|variation| class.call1((variation.name, variation.value, variation.limit, variation.holds))).collect()
 }
 
 #[pymethods]
@@ -59,7 +59,7 @@ impl Check {
 
     fn __repr__(&self) -> String {
         let all = self.inner.identities();
-        let failed = all.iter().filter(|one| !one.holds).count();
+        let failed = all.iter().filter(|variation| !variation.holds).count();
         format!("<flexbody.Check: {failed} of {} failed>", all.len())
     }
 }
@@ -104,8 +104,8 @@ impl Comparison {
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Vec<ComparisonRowTuple<'py>>> {
         let class = py.import("flexbody._types")?.getattr("ComparisonRow")?;
-        let row = |one: &flexbody::ComparisonRow| {
-            class.call1((one.quantity, one.meaning, one.difference, one.tolerance, one.passed))
+        let row = |check: &flexbody::ComparisonRow| {
+            class.call1((check.quantity, check.meaning, check.difference, check.tolerance, check.passed))
         };
         self.inner.rows().iter().map(row).collect()
     }

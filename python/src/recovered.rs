@@ -259,7 +259,7 @@ impl Recovered {
 
     fn __repr__(&self) -> String {
         let rows = self.inner.rows();
-        let names: Vec<&str> = rows.iter().map(|one| one.name.as_str()).collect();
+        let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
         format!("<flexbody.Recovered: {} at {} instants>", names.join(", "), self.inner.times().len())
     }
 }

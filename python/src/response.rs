@@ -138,14 +138,14 @@ impl Response {
     fn random<'py>(&self, py: Python<'py>) -> PyResult<Option<ValuesByRecovery<'py>>> {
         let Some(random) = self.inner.random() else { return Ok(None) };
         let all = PyDict::new(py);
-        for one in &random.recoveries {
+        for recovery in &random.recoveries {
             let values = PyDict::new(py);
-            values.set_item("rows", one.rows.iter().map(|row| row.name.as_str()).collect::<Vec<_>>())?;
-            values.set_item("rms", vector(py, &one.rms))?;
+            values.set_item("rows", recovery.rows.iter().map(|row| row.name.as_str()).collect::<Vec<_>>())?;
+            values.set_item("rms", vector(py, &recovery.rms))?;
             values
-                .set_item("points", one.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>())?;
-            values.set_item("von_mises", vector(py, &one.von_mises))?;
-            all.set_item(&one.name, values)?;
+                .set_item("points", recovery.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>())?;
+            values.set_item("von_mises", vector(py, &recovery.von_mises))?;
+            all.set_item(&recovery.name, values)?;
         }
         Ok(Some(all))
     }

@@ -106,8 +106,11 @@ impl FlexBody {
     /// zero or unknown geometric stiffness.
     pub fn geometric_stiffness(&self) -> Vec<GeometricStiffness> {
         let all = self.0.geometric_stiffness().iter();
-        all.map(|one| GeometricStiffness { load: one.load.label(), matrix: shown(one.matrix.as_ref()) })
-            .collect()
+        all.map(|stiffness| GeometricStiffness {
+            load: stiffness.load.label(),
+            matrix: shown(stiffness.matrix.as_ref()),
+        })
+        .collect()
     }
 
     /// Returns the stiffness of inertia of nodes whose rotations carry mass, for unit loads along the axes of the body
@@ -116,8 +119,11 @@ impl FlexBody {
     /// carries mass.
     pub fn inertia_stiffness(&self) -> Vec<GeometricStiffness> {
         let all = self.0.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
-        all.map(|one| GeometricStiffness { load: one.load.label(), matrix: shown(one.matrix.as_ref()) })
-            .collect()
+        all.map(|stiffness| GeometricStiffness {
+            load: stiffness.load.label(),
+            matrix: shown(stiffness.matrix.as_ref()),
+        })
+        .collect()
     }
 
     /// Returns the decisions about the groups of the kinetic energy: name, whether it is kept, and the reason. Empty if

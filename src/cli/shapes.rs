@@ -27,8 +27,9 @@ pub(super) fn run(arguments: &ShapesArguments) -> Result<Outcome> {
     let outputs: Vec<PathBuf> =
         if is_npz { vec![arguments.output.clone()] } else { vec![arguments.output.clone(), archive] };
     let files = of_manifest_or_job(&arguments.model, &arguments.job)?;
-    let of_shapes = |one: &RecoverySource| matches!(one.operator, OperatorSource::Shapes { .. });
-    let deformed_inertia = files.recoveries.iter().any(|one| of_shapes(one) && one.deformed_inertia);
+    let of_shapes = |recovery: &RecoverySource| matches!(recovery.operator, OperatorSource::Shapes { .. });
+    let deformed_inertia =
+        files.recoveries.iter().any(|recovery| of_shapes(recovery) && recovery.deformed_inertia);
     // Recoveries of the manifest may name results that do not exist yet.
     let files = ModelFiles { recoveries: Vec::new(), ..files };
     let inputs = [&arguments.body, &arguments.model];

@@ -80,7 +80,7 @@ fn together(mut done: Vec<Outcome>, envelope: Option<&EnvelopeFacts<'_>>) -> Out
     let texts: Vec<&str> = done.iter().map(|one| one.text.as_str()).chain(of_all.as_deref()).collect();
     let reports: Vec<&str> = done.iter().map(|one| one.json.trim_end()).collect();
     let mut diagnostics: Vec<Diagnostic> = Vec::new();
-    for said in done.iter().flat_map(|one| &one.diagnostics) {
+    for said in done.iter().flat_map(|outcome| &outcome.diagnostics) {
         if !diagnostics.contains(said) {
             diagnostics.push(said.clone());
         }

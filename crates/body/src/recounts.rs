@@ -78,7 +78,7 @@ fn rigid_interfaces(body: &FlexBody) -> Option<IdentityCheck> {
     if !coupled || !body.has_rigid_interfaces() {
         return None;
     }
-    let rigid = body.interfaces().iter().filter(|one| one.coupling == Some(Coupling::Rigid));
+    let rigid = body.interfaces().iter().filter(|interface| interface.coupling == Some(Coupling::Rigid));
     let value = largest(rigid.map(|interface| deformation(body, interface)));
     let limit = MAX_RIGID_ROUNDING + 4.0 * body.storage().rounding();
     let formula = "nodes of rigid interfaces move as their reference points";
@@ -245,9 +245,9 @@ pub(super) fn interface_note(body: &FlexBody, model: &FeModel) -> Option<Diagnos
     };
     let missed: Vec<&Interface> = body.interfaces().iter().filter(differs).collect();
     let names: Vec<String> = missed.iter().map(|one| format!("`{}`", one.name)).collect();
-    let option = |one: &&Interface| match one.coupling {
-        Some(coupling) => format!("--interface {}=NODES,{}", one.name, coupling.name()),
-        None => format!("--interface {}=NODES", one.name),
+    let option = |interface: &&Interface| match interface.coupling {
+        Some(coupling) => format!("--interface {}=NODES,{}", interface.name, coupling.name()),
+        None => format!("--interface {}=NODES", interface.name),
     };
     let options: Vec<String> = missed.iter().map(option).collect();
     let message = match (missed.is_empty(), in_model.is_empty()) {

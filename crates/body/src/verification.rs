@@ -491,17 +491,18 @@ fn geometric_check(
     let size = shapes.ncols();
     let matrix_of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
         let one = list.iter().find(|one| one.load == *load);
-        one.map_or_else(|| Mat::zeros(size, size), |one| one.matrix.clone())
+        one.map_or_else(|| Mat::zeros(size, size), |stiffness| stiffness.matrix.clone())
     };
     let loads = stored.iter().chain(&found).map(|one| &one.load);
     let difference = |load: &UnitLoad| {
         let (stored, recomputed) = (matrix_of(&stored, load), matrix_of(&found, load));
         // Every component of the kind may contribute.
-        let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
-        let of_given: f64 = given.map(|one| rounding_of(&one.matrix, &shapes, body.storage())).sum();
+        let given = model.geometric_stiffness().iter().filter(|stiffness| stiffness.load.kind == load.kind);
+        let of_given: f64 =
+            given.map(|stiffness| rounding_of(&stiffness.matrix, &shapes, body.storage())).sum();
         let size = stored.norm_max().max(recomputed.norm_max());
         // What is computed from elements is as accurate as the static response to the load.
-        let is_given = model.geometric_stiffness().iter().any(|one| one.load.kind == load.kind);
+        let is_given = model.geometric_stiffness().iter().any(|stiffness| stiffness.load.kind == load.kind);
         let rounding = if is_given { of_given } else { size * limit_of_responses(body.storage()) };
         Difference::new(largest_entry((&stored - &recomputed).as_ref()), size, rounding)
     };

@@ -285,7 +285,7 @@ impl Draft {
             let order: Vec<UnitLoad> = InertiaStiffness::loads(3).collect();
             inertia.stiffness.sort_by_key(|one| order.iter().position(|load| *load == one.load));
         }
-        self.body.estimated_stiffness.sort_by_key(|one| one.load.component);
+        self.body.estimated_stiffness.sort_by_key(|stiffness| stiffness.load.component);
         if self.triangles.is_some() || self.edges.is_some() {
             let triangles = self.triangles.unwrap_or_default().as_chunks().0.to_vec();
             let edges = self.edges.unwrap_or_default().as_chunks().0.to_vec();

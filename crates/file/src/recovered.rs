@@ -37,9 +37,9 @@ pub fn fill_recovered(
 fn fill(body: &FlexBody, motion: &RecoveredMotion, origin: (&str, &str), path: &Path) -> hdf5::Result<()> {
     let (file, mut numbers) = begun(path, FORMAT, body, origin, &motion.states.times)?;
     make(&file, "/recovery")?;
-    for one in &motion.recoveries {
-        let group = make(&file, &format!("/recovery/{}", names::encode(&one.name)))?;
-        fill_rows(&group, one, motion, &mut numbers)?;
+    for recovery in &motion.recoveries {
+        let group = make(&file, &format!("/recovery/{}", names::encode(&recovery.name)))?;
+        fill_rows(&group, recovery, motion, &mut numbers)?;
     }
     finish(file, path, &numbers)
 }

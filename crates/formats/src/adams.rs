@@ -155,10 +155,10 @@ fn document(body: &FlexBody, quantities: &[Quantity], frames: &[ExportFrame]) ->
     };
     let rows =
         |a: &Mat<f64>| -> Vec<Vec<f64>> { a.row_iter().map(|row| row.iter().copied().collect()).collect() };
-    let frame = |one: &ExportFrame| {
+    let frame = |follower: &ExportFrame| {
         json!({
-            "node": one.id, "name": one.name, "position": one.position,
-            "translation": rows(&one.translation), "rotation": one.rotation.as_ref().map(rows),
+            "node": follower.id, "name": follower.name, "position": follower.position,
+            "translation": rows(&follower.translation), "rotation": follower.rotation.as_ref().map(rows),
         })
     };
     let units = body.units();
@@ -184,15 +184,15 @@ fn text(body: &FlexBody, quantities: &[Quantity], frames: &[ExportFrame]) -> Str
     let units = body.units();
     let (length, mass, time) = (units.length.name(), units.mass.name(), units.time.name());
     write_line(&mut out, format_args!("# units: length {length}, mass {mass}, time {time}"));
-    for one in quantities {
-        let shape: Vec<String> = one.shape.iter().map(ToString::to_string).collect();
-        let Quantity { name, title, formula, units, .. } = one;
+    for quantity in quantities {
+        let shape: Vec<String> = quantity.shape.iter().map(ToString::to_string).collect();
+        let Quantity { name, title, formula, units, .. } = quantity;
         write_line(&mut out, format_args!("\n# {title}: {formula}, in {units}"));
-        match &one.values {
+        match &quantity.values {
             None => write_line(&mut out, format_args!("{name} none")),
             Some(values) => {
                 write_line(&mut out, format_args!("{name} {}", shape.join(" ")));
-                lines(&mut out, values, one.shape.last().copied().unwrap_or(1));
+                lines(&mut out, values, quantity.shape.last().copied().unwrap_or(1));
             }
         }
     }

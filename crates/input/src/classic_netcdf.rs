@@ -164,7 +164,8 @@ impl<'f> Header<'f> {
         for _ in 0..self.list(VARIABLES)? {
             variables.push(self.variable(&lengths)?);
         }
-        let bytes_of_records = || variables.iter().filter(|one| one.records.is_some()).map(|one| one.bytes);
+        let bytes_of_records =
+            || variables.iter().filter(|variable| variable.records.is_some()).map(|variable| variable.bytes);
         // The records of a variable alone follow each other without padding.
         let record_bytes = match bytes_of_records().count() {
             1 => bytes_of_records().sum(),
@@ -173,13 +174,17 @@ impl<'f> Header<'f> {
                 .ok_or(CUT_OFF)?,
         };
         // A file that was being written does not state its number of records.
-        let first = variables.iter().filter(|one| one.records.is_some()).map(|one| one.begin).min();
+        let first = variables
+            .iter()
+            .filter(|variable| variable.records.is_some())
+            .map(|variable| variable.begin)
+            .min();
         let records = match (stated, first) {
             (Some(stated), _) => stated,
             (None, Some(first)) if record_bytes > 0 => self.bytes.len().saturating_sub(first) / record_bytes,
             (None, _) => 0,
         };
-        for variable in variables.iter_mut().filter(|one| one.records.is_some()) {
+        for variable in variables.iter_mut().filter(|variable| variable.records.is_some()) {
             variable.records = Some(records);
             variable.shape[0] = records;
             size(&variable.shape, 1).ok_or(CUT_OFF)?;

@@ -365,7 +365,7 @@ impl ModelFiles {
             _ => None,
         });
         let damping = self.damping.as_ref().and_then(Damping::matrix).map(|place| place.path.clone());
-        let geometric = self.geometric_stiffness.iter().flat_map(|one| one.matrix.files());
+        let geometric = self.geometric_stiffness.iter().flat_map(|stiffness| stiffness.matrix.files());
         let geometric = geometric.map(Path::to_path_buf);
         let paths = match &self.source {
             ModelSource::Tables(TableFiles { stiffness, mass, nodes, dofs }) => {

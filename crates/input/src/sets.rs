@@ -73,11 +73,12 @@ impl NodeSets {
         keep_elements: bool,
     ) -> Self {
         let name_elements = |scope: &SetScope| scope.nodes.name_elements();
-        let are_used =
-            keep_elements || name_elements(&top) || instances.iter().any(|one| name_elements(&one.scope));
+        let are_used = keep_elements
+            || name_elements(&top)
+            || instances.iter().any(|instance| name_elements(&instance.scope));
         if !are_used && !top.elements.has_ranges() {
             top.element_nodes.clear();
-            instances.iter_mut().for_each(|one| one.scope.element_nodes.clear());
+            instances.iter_mut().for_each(|instance| instance.scope.element_nodes.clear());
         }
         let mut by_form = HashMap::new();
         for (at, instance) in instances.iter().enumerate() {
@@ -232,7 +233,8 @@ mod tests {
                 Members::Edited(edits) => 1 + edits.len(),
                 _ => 1,
             };
-            let scopes = self.scopes.instances.iter().map(|one| &one.scope).chain([&self.scopes.top]);
+            let scopes =
+                self.scopes.instances.iter().map(|instance| &instance.scope).chain([&self.scopes.top]);
             let lists = scopes.flat_map(|scope| [&scope.nodes, &scope.elements]);
             lists.flat_map(|list| &list.all).flat_map(|set| &set.items).map(of_item).sum()
         }

@@ -90,8 +90,8 @@ mod tests {
         sort_ascending(&mut ascending, |x| *x);
         assert_eq!(ascending, [0.5, up, 1.0, 2.0]);
         let mut named = [("a", 1.0), ("b", 2.0), ("c", up)];
-        sort_descending(&mut named, |one| one.1);
-        assert_eq!(named.map(|one| one.0), ["b", "a", "c"]);
+        sort_descending(&mut named, |pair| pair.1);
+        assert_eq!(named.map(|pair| pair.0), ["b", "a", "c"]);
     }
 
     #[test]

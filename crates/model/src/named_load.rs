@@ -151,7 +151,7 @@ pub(crate) fn refuse_stiff_preloads(
 ) -> Vec<Diagnostic> {
     let is_stiff = |load: &&ModelLoad| {
         let named = |kind: &LoadKind| matches!(kind, LoadKind::Named(name) if *name == load.name);
-        load.preload && stiffness.iter().any(|one| named(&one.load.kind))
+        load.preload && stiffness.iter().any(|stiffness| named(&stiffness.load.kind))
     };
     let refused = |load: &ModelLoad| {
         let message =

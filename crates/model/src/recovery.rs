@@ -408,7 +408,7 @@ fn strained(recovery: &ModelRecovery, fields: &Mat<f64>, rows: &Rows) -> Option<
     let checked = (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion());
     let wrong: Vec<(usize, f64)> =
         checked.map(|j| (j, response(j))).filter(|(_, part)| *part > MAX_RIGID_RESPONSE).collect();
-    let &(worst, part) = first_largest(&wrong, |one| one.1)?;
+    let &(worst, part) = first_largest(&wrong, |pair| pair.1)?;
     let row = &labels[worst];
     let message = format!(
         "recovery `{}`: a rigid motion of the body gives {} of {} rows a value, most of all the {} `{}`: {part:.1e} of the sum of its terms, expected below {MAX_RIGID_RESPONSE:e}",
@@ -470,13 +470,13 @@ fn middle_of(at: &[u32], fields: &Mat<f64>, d: usize, displaced: usize) -> Vecto
 /// entries, or a cut with nodes, in this body.
 pub(crate) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &Nodes) -> Vec<ModelRecovery> {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
-    let operator = |one: &ModelRecovery| match &one.operator {
+    let operator = |recovery: &ModelRecovery| match &recovery.operator {
         RecoveryOperator::Cut { nodes: side, about } => side
             .iter()
             .any(|id| known.contains(id))
             .then(|| RecoveryOperator::Cut { nodes: side.clone(), about: *about }),
         RecoveryOperator::Shapes { shapes, .. } => {
-            shapes.dofs.iter().any(|dof| known.contains(&dof.node)).then(|| one.operator.clone())
+            shapes.dofs.iter().any(|dof| known.contains(&dof.node)).then(|| recovery.operator.clone())
         }
         RecoveryOperator::Rows { transposed, labels, offset } => {
             let mut entries = Vec::new();
@@ -496,7 +496,8 @@ pub(crate) fn recoveries_of_body(all: &[ModelRecovery], kept: &[usize], nodes: &
             })
         }
     };
-    let one = |one: &ModelRecovery| Some(ModelRecovery { operator: operator(one)?, ..one.clone() });
+    let one =
+        |recovery: &ModelRecovery| Some(ModelRecovery { operator: operator(recovery)?, ..recovery.clone() });
     all.iter().filter_map(one).collect()
 }
 
@@ -508,8 +509,8 @@ pub(crate) fn refuse_several_bodies(
     body_of_node: impl Fn(i64) -> Option<usize>,
     found: &mut Vec<Diagnostic>,
 ) {
-    for one in all {
-        let mut bodies: Vec<usize> = match &one.operator {
+    for recovery in all {
+        let mut bodies: Vec<usize> = match &recovery.operator {
             RecoveryOperator::Rows { transposed, .. } => {
                 transposed.row_idx().iter().map(|row| body_of_row(*row as usize) + 1).collect()
             }
@@ -524,8 +525,8 @@ pub(crate) fn refuse_several_bodies(
         bodies.dedup();
         if bodies.len() > 1 {
             let message =
-                format!("recovery `{}` reads {} bodies: {}", one.name, bodies.len(), name_some(&bodies));
-            let diagnostic = Diagnostic::new(Code::BodiesCoupled, message).in_file(&one.path);
+                format!("recovery `{}` reads {} bodies: {}", recovery.name, bodies.len(), name_some(&bodies));
+            let diagnostic = Diagnostic::new(Code::BodiesCoupled, message).in_file(&recovery.path);
             found.push(diagnostic.with_help("give one [[recovery]] for each body"));
         }
     }

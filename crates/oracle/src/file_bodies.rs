@@ -400,9 +400,9 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     matrix(&mut bits, &p.modes.shape);
     p.geometric_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
     p.estimated_stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
-    for one in &p.rotated_stiffness {
-        matrix(&mut bits, &one.modes);
-        matrix(&mut bits, &one.rotation);
+    for follower in &p.rotated_stiffness {
+        matrix(&mut bits, &follower.modes);
+        matrix(&mut bits, &follower.rotation);
     }
     if let Some(own) = &p.inertia_stiffness {
         own.stiffness.iter().for_each(|g| matrix(&mut bits, &g.matrix));
@@ -426,10 +426,13 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     if let Some(c) = &p.coordinates {
         [&c.stiffness, &c.mass, &c.of_modes].into_iter().for_each(|m| matrix(&mut bits, m));
     }
-    for one in &p.recoveries {
-        bits.extend(one.offset.iter().map(|v| v.to_bits()));
-        let columns = one.loads.iter().map(|load| &load.columns);
-        [&one.modes, &one.spin, &one.named].into_iter().chain(columns).for_each(|m| matrix(&mut bits, m));
+    for recovery in &p.recoveries {
+        bits.extend(recovery.offset.iter().map(|v| v.to_bits()));
+        let columns = recovery.loads.iter().map(|load| &load.columns);
+        [&recovery.modes, &recovery.spin, &recovery.named]
+            .into_iter()
+            .chain(columns)
+            .for_each(|m| matrix(&mut bits, m));
     }
     for load in &p.named_loads {
         let resultant = load.force.iter().chain(&load.torque).chain(&load.moments);
@@ -442,10 +445,10 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
         p.named_loads.iter().map(|load| (&load.name, load.preload)).collect::<Vec<_>>(),
         p.recoveries
             .iter()
-            .map(|one| (
-                &one.name,
-                &one.rows,
-                one.loads.iter().map(|load| &load.interface).collect::<Vec<_>>()
+            .map(|recovery| (
+                &recovery.name,
+                &recovery.rows,
+                recovery.loads.iter().map(|load| &load.interface).collect::<Vec<_>>()
             ))
             .collect::<Vec<_>>(),
         p.source,

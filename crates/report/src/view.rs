@@ -75,8 +75,9 @@ impl Colouring<'_> {
         };
         match self {
             Self::Recovery(name) => {
-                let Some(recovery) = body.recoveries().iter().find(|one| one.name == name) else {
-                    let known: Vec<&str> = body.recoveries().iter().map(|one| one.name.as_str()).collect();
+                let Some(recovery) = body.recoveries().iter().find(|recovery| recovery.name == name) else {
+                    let known: Vec<&str> =
+                        body.recoveries().iter().map(|recovery| recovery.name.as_str()).collect();
                     let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
                     return refuse(
                         format!("the body has no recovery `{name}`"),

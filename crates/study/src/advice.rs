@@ -103,7 +103,7 @@ impl Advice {
 
     /// Returns the first guideline that qualifies. The last one always does.
     pub fn guideline(&self) -> &GuidelineAdvice {
-        let first = self.guidelines.iter().find(|one| one.qualifies());
+        let first = self.guidelines.iter().find(|guideline| guideline.qualifies());
         first.unwrap_or(&self.guidelines[self.guidelines.len() - 1])
     }
 }

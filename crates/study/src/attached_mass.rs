@@ -89,8 +89,8 @@ impl<'b> Carried<'b> {
 }
 
 fn interface_of<'b>(body: &'b FlexBody, name: &str) -> Result<&'b Interface> {
-    body.interfaces().iter().find(|one| one.name == name).ok_or_else(|| {
-        let names: Vec<&str> = body.interfaces().iter().map(|one| one.name.as_str()).collect();
+    body.interfaces().iter().find(|interface| interface.name == name).ok_or_else(|| {
+        let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
         let help = if names.is_empty() {
             "leave the interface out: the mass is then at the node farthest from the centre".to_owned()
         } else {

@@ -313,7 +313,7 @@ fn absent_stiffness(body: &FlexBody) -> StressLoads {
     }
     let is_at_interface = |one: &UnitLoad| matches!(one.kind, LoadKind::Force(_) | LoadKind::Moment(_));
     let interfaces = body.interfaces().iter().any(|interface| interface.reference.is_some())
-        && !body.geometric_stiffness().iter().any(|one| is_at_interface(&one.load));
+        && !body.geometric_stiffness().iter().any(|stiffness| is_at_interface(&stiffness.load));
     StressLoads { spin: true, interfaces, loads: false }
 }
 

@@ -12,8 +12,8 @@ pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
     name: fn(T) -> &'static str,
     about: fn(T) -> &'static str,
 ) -> impl TypedValueParser<Value = T> {
-    let shown = all.iter().map(|&one| PossibleValue::new(name(one)).help(about(one)));
-    let called = move |text: String| all.iter().copied().find(|&one| name(one) == text);
+    let shown = all.iter().map(|&value| PossibleValue::new(name(value)).help(about(value)));
+    let called = move |text: String| all.iter().copied().find(|&value| name(value) == text);
     PossibleValuesParser::new(shown).map(move |text| called(text).expect("one of the possible values"))
 }
 

@@ -307,6 +307,6 @@ fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
 /// amplitude in `parts` (shapes x modes) for M-orthonormal shapes and modes.
 pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {
     let shares = |p: usize| parts.col(p).iter().map(|a| a * a).enumerate();
-    let largest = |p: usize| first_largest(shares(p), |one| one.1).unwrap_or((0, 0.0));
+    let largest = |p: usize| first_largest(shares(p), |pair| pair.1).unwrap_or((0, 0.0));
     (0..parts.ncols()).map(largest).collect()
 }

@@ -282,11 +282,11 @@ const REPORTED_COMPLIANCE: f64 = 0.01;
 /// [`Truncation`]: crate::flex_body::Truncation
 pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
     let worst = |interface: &Interface| {
-        let of_interface = body.modes().truncation.iter().filter_map(|one| {
-            let direction = one.load.strip_prefix(interface.name.as_str())?.strip_prefix(' ')?;
-            Some((one.after.powi(2), direction))
+        let of_interface = body.modes().truncation.iter().filter_map(|truncation| {
+            let direction = truncation.load.strip_prefix(interface.name.as_str())?.strip_prefix(' ')?;
+            Some((truncation.after.powi(2), direction))
         });
-        let (missing, direction) = first_largest(of_interface, |one| one.0)?;
+        let (missing, direction) = first_largest(of_interface, |pair| pair.0)?;
         let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * missing);
         (missing > REPORTED_COMPLIANCE).then(named)
     };

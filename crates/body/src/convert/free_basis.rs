@@ -233,9 +233,9 @@ impl StaticLoads {
         }
         let named = model.named_loads();
         parts.push(Mat::from_fn(model.rows().len(), named.len(), |i, c| named[c].forces[i]));
-        let of_motion = |one: &MotionForces| (one.load, one.load.of_dimension(model.dimension()));
+        let of_motion = |forces: &MotionForces| (forces.load, forces.load.of_dimension(model.dimension()));
         let kinds = motion.iter().map(of_motion).collect();
-        parts.extend(motion.into_iter().map(|one| one.forces));
+        parts.extend(motion.into_iter().map(|response| response.forces));
         let parts: Vec<_> = parts.iter().map(Mat::as_ref).collect();
         Ok(Self {
             forces: side_by_side(&parts),

@@ -160,10 +160,10 @@ pub fn modal_geometric_stiffness(
             return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
         }
     }
-    let kinds: Vec<LoadKind> = out.iter().map(|one| one.load.kind.clone()).collect();
+    let kinds: Vec<LoadKind> = out.iter().map(|stiffness| stiffness.load.kind.clone()).collect();
     let place = |kind: &LoadKind| kinds.iter().position(|one| one == kind);
     let mut out = stiffness_about(&along(&out, &frame.axes), shift, model.dimension());
-    out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
+    out.sort_by_key(|stiffness| (place(&stiffness.load.kind), stiffness.load.component));
     Ok(split(out))
 }
 

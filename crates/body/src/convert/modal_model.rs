@@ -94,7 +94,7 @@ impl<'m> ModalModel<'m> {
         let computed = stress_stiffness(model, settings.stress_stiffness, &of, context)?;
         let (geometric_stiffness, rotated_stiffness) =
             modal_geometric_stiffness(model, &modes.vectors, computed, &frame, &shift)?;
-        let has_spin = geometric_stiffness.iter().any(|one| one.load.kind == LoadKind::Spin);
+        let has_spin = geometric_stiffness.iter().any(|stiffness| stiffness.load.kind == LoadKind::Spin);
         let estimated_stiffness = if given_frame.is_some() || has_spin {
             Vec::new()
         } else {

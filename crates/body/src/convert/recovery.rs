@@ -86,7 +86,7 @@ impl BodyOfModel<'_> {
         let basis = FreeBasis::new(self.model, &self.modes.vectors, self.modal_stiffness.clone())?;
         let inertia = asked.iter().any(|one| one.deformed_inertia);
         let loads = StaticLoads::new(self.model, &basis, &self.modes.vectors, inertia)?;
-        let is_cut = |one: &ModelRecovery| matches!(one.operator, RecoveryOperator::Cut { .. });
+        let is_cut = |recovery: &ModelRecovery| matches!(recovery.operator, RecoveryOperator::Cut { .. });
         let responses = if !asked.iter().all(is_cut) || !named_loads.is_empty() {
             self.responses(&basis, &loads, groups, context)?
         } else {
@@ -99,37 +99,37 @@ impl BodyOfModel<'_> {
             _ => basis.sizes_of_responses(&responses, &loads, groups),
         };
         let mut diagnostics = Vec::new();
-        let one = |one: &ModelRecovery| match &one.operator {
+        let one = |recovery: &ModelRecovery| match &recovery.operator {
             RecoveryOperator::Rows { transposed, labels, offset } => {
                 let modes = product(transposed, &self.modes.vectors);
                 let columns = product(transposed, &responses);
                 let offset = offset.clone().unwrap_or_else(|| vec![0.0; labels.len()]);
-                Ok(loads.recovery(one, labels.clone(), offset, modes, &columns))
+                Ok(loads.recovery(recovery, labels.clone(), offset, modes, &columns))
             }
             RecoveryOperator::Shapes { shapes, labels } => {
-                let responses = responses.as_ref().subcols(0, loads.count_for(one)).to_owned();
+                let responses = responses.as_ref().subcols(0, loads.count_for(recovery)).to_owned();
                 let targets = Targets {
                     modes: &basis.modes,
                     responses: &responses,
                     sizes: sizes[..responses.ncols()].to_vec(),
                     names: loads.names(),
                 };
-                let mapped = mapped_answers(self.model, one, shapes, &targets)?;
+                let mapped = mapped_answers(self.model, recovery, shapes, &targets)?;
                 diagnostics.extend(mapped.diagnostics);
                 let offset = vec![0.0; labels.len()];
-                Ok(loads.recovery(one, labels.clone(), offset, mapped.modes, &mapped.columns))
+                Ok(loads.recovery(recovery, labels.clone(), offset, mapped.modes, &mapped.columns))
             }
             RecoveryOperator::Cut { nodes, about } => {
-                self.refuse_divided_interface(one, nodes, &basis.coupled)?;
+                self.refuse_divided_interface(recovery, nodes, &basis.coupled)?;
                 let side = one_side(self.model, nodes, *about);
                 let (modes, columns) = basis.section_forces(self.model, &side, &loads, groups);
                 let labels = section_labels(self.model, *about);
                 let offset = vec![0.0; labels.len()];
-                Ok(loads.recovery(one, labels, offset, modes, &columns))
+                Ok(loads.recovery(recovery, labels, offset, modes, &columns))
             }
         };
         let along_model = asked.iter().map(one).collect::<Result<Vec<Recovery>>>()?;
-        let turned = |one: &Recovery| one.in_axes(&self.place.frame.axes);
+        let turned = |recovery: &Recovery| recovery.in_axes(&self.place.frame.axes);
         let mut of_modes = Vec::new();
         if self.is_check {
             let amplitudes = basis.static_amplitudes(&loads, groups);

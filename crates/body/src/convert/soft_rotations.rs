@@ -43,7 +43,7 @@ pub(super) fn effect_of_soft_rotations(model: &FeModel, found: &ModalBasis) -> O
             "no frequency of the first {count} modes changes by more than {REPORTED_CHANGE:.0e} because soft rotations follow the nodes around"
         ),
         Some(lowest) => {
-            let most = first_largest((0..count).map(|mode| (mode, change(mode))), |one| one.1);
+            let most = first_largest((0..count).map(|mode| (mode, change(mode))), |pair| pair.1);
             let more = most.filter(|(mode, _)| *mode != lowest);
             let more = more.map(|(mode, _)| format!("; mode {} changes most: {}", mode + 1, words(mode)));
             format!(

@@ -52,8 +52,9 @@ pub(super) fn estimated_stiffness(
 ) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
     let components = LoadKind::Spin.of_dimension(model.dimension());
     let load = |component: usize| UnitLoad { kind: LoadKind::Spin, component };
-    let is_missing =
-        |component: &usize| model.geometric_stiffness().iter().all(|one| one.load != load(*component));
+    let is_missing = |component: &usize| {
+        model.geometric_stiffness().iter().all(|stiffness| stiffness.load != load(*component))
+    };
     let missing: Vec<usize> = (0..components.len()).filter(|at| is_missing(&components[*at])).collect();
     let is_large = model.dimension() * model.nodes().len() > MAX_DISPLACEMENTS;
     if missing.is_empty() || is_large {
@@ -72,12 +73,12 @@ pub(super) fn estimated_stiffness(
         GeometricStiffness { load: load(components[at]), matrix }
     };
     let all: Vec<_> = missing.iter().map(of_load).collect();
-    let is_finite = |one: &GeometricStiffness<Mat<f64>>| one.matrix.norm_max().is_finite();
+    let is_finite = |stiffness: &GeometricStiffness<Mat<f64>>| stiffness.matrix.norm_max().is_finite();
     if !all.iter().all(is_finite) {
         return Ok(Vec::new());
     }
     let mut turned = along(&all, &frame.axes);
-    turned.sort_by_key(|one| one.load.component);
+    turned.sort_by_key(|stiffness| stiffness.load.component);
     Ok(turned)
 }
 

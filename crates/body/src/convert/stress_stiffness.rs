@@ -23,7 +23,8 @@ fn is_wanted(wanted: StressLoads, model: &FeModel, load: &UnitLoad) -> bool {
         LoadKind::Spin => wanted.spin,
         LoadKind::Force(_) | LoadKind::Moment(_) => wanted.interfaces,
         LoadKind::Named(name) => {
-            let is_preload = model.named_loads().iter().any(|one| one.preload && one.name == *name);
+            let is_preload =
+                model.named_loads().iter().any(|named_load| named_load.preload && named_load.name == *name);
             wanted.loads && !is_preload
         }
         LoadKind::Acceleration | LoadKind::AngularAcceleration => false,
@@ -54,7 +55,9 @@ pub(crate) fn stress_stiffness(
     context: &Context<'_>,
 ) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
     let loads = StaticLoads::of_model(model)?;
-    let is_given = |load: &UnitLoad| model.geometric_stiffness().iter().any(|one| one.load.kind == load.kind);
+    let is_given = |load: &UnitLoad| {
+        model.geometric_stiffness().iter().any(|stiffness| stiffness.load.kind == load.kind)
+    };
     let unit_loads = loads.unit_loads();
     let columns: Vec<usize> = (0..unit_loads.len())
         .filter(|&at| is_wanted(wanted, model, &unit_loads[at]) && !is_given(&unit_loads[at]))

@@ -74,7 +74,8 @@ impl FlexBody {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
         parts.named_loads = parts.named_loads.iter().map(|load| load.without_rigid_motion(&motion)).collect();
-        parts.recoveries = parts.recoveries.iter().map(|one| one.without_rigid_motion(&motion)).collect();
+        parts.recoveries =
+            parts.recoveries.iter().map(|recovery| recovery.without_rigid_motion(&motion)).collect();
         (parts.geometric_stiffness, parts.rotated_stiffness) = (geometric_stiffness, rotated_stiffness);
         // The estimate is that of the free body, without the stress of the reaction.
         parts.estimated_stiffness = Vec::new();
@@ -186,7 +187,10 @@ impl FlexBody {
         self.is_complete()
             || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
             || modes.truncation.iter().any(|one| named(&one.load))
-                && modes.truncation.iter().all(|one| !named(&one.load) || one.after < MAX_TRUNCATION)
+                && modes
+                    .truncation
+                    .iter()
+                    .all(|truncation| !named(&truncation.load) || truncation.after < MAX_TRUNCATION)
             || modes.provenance.iter().any(|one| made_for(one))
             || self.is_whole_craig_bampton(name)
     }

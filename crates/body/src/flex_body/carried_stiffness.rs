@@ -44,11 +44,12 @@ impl FlexBody {
         }
         for load in self.loads_with_reaction(name) {
             let Resultant { force, moment } = self.reaction_to(&load);
-            for one in &reaction {
-                let resultant = if matches!(one.load.kind, LoadKind::Force(_)) { force } else { moment };
-                let amount = resultant[one.load.component];
+            for stiffness in &reaction {
+                let resultant =
+                    if matches!(stiffness.load.kind, LoadKind::Force(_)) { force } else { moment };
+                let amount = resultant[stiffness.load.component];
                 if amount != 0.0 {
-                    let part = &one.matrix * Scale(amount);
+                    let part = &stiffness.matrix * Scale(amount);
                     match all.iter_mut().find(|known| known.load == load) {
                         Some(sum) => sum.matrix += part,
                         None => all.push(GeometricStiffness { load: load.clone(), matrix: part }),

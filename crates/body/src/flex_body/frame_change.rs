@@ -105,7 +105,11 @@ impl FlexBody {
             );
         }
         let convert = "convert the FE model with the frame that is needed (--frame)";
-        if self.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_))) {
+        if self
+            .geometric_stiffness()
+            .iter()
+            .any(|stiffness| !matches!(stiffness.load.kind, LoadKind::Named(_)))
+        {
             return refuse("the geometric stiffness of the rigid motion in the modes is not known", convert);
         }
         if self.modes().internal.is_some() {
@@ -125,9 +129,9 @@ impl FlexBody {
             }
             _ => None,
         };
-        let stiffness = |one: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
-            load: one.load.clone(),
-            matrix: change.congruent(&one.matrix),
+        let stiffness = |stiffness: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
+            load: stiffness.load.clone(),
+            matrix: change.congruent(&stiffness.matrix),
         };
         (parts.geometric_stiffness, parts.rotated_stiffness) = match self.stiffness_with_rotation() {
             Some(all) => split(transformed(all, &change.beside_rotations())),
@@ -139,8 +143,9 @@ impl FlexBody {
             parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         // Rows that rigid motion changes are known only relative to the former frame.
         parts.recoveries.retain(Recovery::ignores_rigid_motion);
-        parts.recoveries = parts.recoveries.iter().map(|one| one.with_modes(change)).collect();
-        parts.named_loads = parts.named_loads.iter().map(|one| one.with_modes(change)).collect();
+        parts.recoveries = parts.recoveries.iter().map(|recovery| recovery.with_modes(change)).collect();
+        parts.named_loads =
+            parts.named_loads.iter().map(|named_load| named_load.with_modes(change)).collect();
         parts.certificate = unproved(&parts);
         (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);
         Self::new(parts)

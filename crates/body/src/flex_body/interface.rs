@@ -50,7 +50,7 @@ impl InterfaceRows {
     /// motion of the interface in any mode.
     pub fn deformation(&self) -> (usize, f64) {
         let by_mode = self.misfit.iter().copied().enumerate();
-        let (mode, misfit) = first_largest(by_mode, |one| one.1).unwrap_or((0, 0.0));
+        let (mode, misfit) = first_largest(by_mode, |pair| pair.1).unwrap_or((0, 0.0));
         (mode, if self.largest > 0.0 { misfit / self.largest } else { 0.0 })
     }
 }

@@ -19,7 +19,7 @@ impl FlexBody {
 
     /// Returns true if the body has geometric stiffness of spin.
     pub fn has_spin_stiffness(&self) -> bool {
-        self.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin)
+        self.geometric_stiffness().iter().any(|stiffness| stiffness.load.kind == LoadKind::Spin)
     }
 
     /// Returns the stress stiffness of spin that a motion of the body leaves out: the stored estimate of what the body does
@@ -28,7 +28,7 @@ impl FlexBody {
     /// * `uses_given`: true if the motion uses the geometric stiffness of the body; otherwise that of spin is left out too.
     pub fn missing_stiffness(&self, uses_given: bool) -> Vec<GeometricStiffness<Mat<f64>>> {
         let is_left_out =
-            |one: &&GeometricStiffness<Mat<f64>>| !uses_given && one.load.kind == LoadKind::Spin;
+            |stiffness: &&GeometricStiffness<Mat<f64>>| !uses_given && stiffness.load.kind == LoadKind::Spin;
         let given = self.geometric_stiffness().iter().filter(is_left_out);
         let known: Vec<_> = self.estimated_stiffness().iter().chain(given).cloned().collect();
         if !known.is_empty() || self.has_spin_stiffness() {
@@ -57,10 +57,10 @@ impl FlexBody {
         if !uses_given {
             parts.geometric_stiffness = Vec::new();
         }
-        for one in missing {
-            match parts.geometric_stiffness.iter_mut().find(|known| known.load == one.load) {
-                Some(known) => known.matrix += &one.matrix,
-                None => parts.geometric_stiffness.push(one),
+        for stiffness in missing {
+            match parts.geometric_stiffness.iter_mut().find(|known| known.load == stiffness.load) {
+                Some(known) => known.matrix += &stiffness.matrix,
+                None => parts.geometric_stiffness.push(stiffness),
             }
         }
         Self::new(parts)

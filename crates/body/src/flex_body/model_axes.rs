@@ -77,7 +77,7 @@ impl FlexBody {
         parts.estimated_stiffness = along(self.estimated_stiffness(), &to_body);
         parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
         parts.named_loads = self.named_loads_in(&origin, &to_body);
-        parts.recoveries = parts.recoveries.iter().map(|one| one.in_axes(&to_body)).collect();
+        parts.recoveries = parts.recoveries.iter().map(|recovery| recovery.in_axes(&to_body)).collect();
         parts.coordinates = None;
         Self::new(parts)
     }
@@ -148,8 +148,8 @@ pub fn stiffness_about(
         return all;
     }
     let unit = |axis: usize| Vector3::ith(axis, 1.0);
-    for one in given.iter().filter(|one| one.load.kind == LoadKind::Acceleration) {
-        let along = one.load.component;
+    for stiffness in given.iter().filter(|stiffness| stiffness.load.kind == LoadKind::Acceleration) {
+        let along = stiffness.load.component;
         for kind in [LoadKind::AngularAcceleration, LoadKind::Spin] {
             for &component in kind.of_dimension(dimension) {
                 let acceleration = match kind {
@@ -160,7 +160,7 @@ pub fn stiffness_about(
                     }
                     _ => unit(component).cross(d),
                 };
-                let part = &one.matrix * Scale(-acceleration[along]);
+                let part = &stiffness.matrix * Scale(-acceleration[along]);
                 if acceleration[along] != 0.0 {
                     add(&mut all, UnitLoad { kind: kind.clone(), component }, part);
                 }

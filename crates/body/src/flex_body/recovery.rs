@@ -74,9 +74,9 @@ impl Recovery {
         assert_eq!(state.named.len(), self.named.ncols(), "named loads");
         let w = state.motion.angular_velocity;
         let products = LoadKind::SPIN.map(|(k, l)| w[k] * w[l]);
-        let amplitudes = |one: &MotionColumns| {
-            let mut amplitudes = vec![0.0; one.columns.ncols()];
-            one.load.write_amplitudes(&state.motion, &mut amplitudes);
+        let amplitudes = |columns: &MotionColumns| {
+            let mut amplitudes = vec![0.0; columns.columns.ncols()];
+            columns.load.write_amplitudes(&state.motion, &mut amplitudes);
             amplitudes
         };
         let of_motion: Vec<Vec<f64>> = self.motion.iter().map(amplitudes).collect();
@@ -123,7 +123,8 @@ impl Recovery {
                 (0..3).map(|k| columns[(i, first + k)] * axes[(k, a % 3)]).sum()
             })
         };
-        let load = |one: &LoadColumns| LoadColumns { columns: turned(&one.columns), ..one.clone() };
+        let load =
+            |columns: &LoadColumns| LoadColumns { columns: turned(&columns.columns), ..columns.clone() };
         Self {
             spin: Mat::from_fn(self.rows.len(), LoadKind::SPIN.len(), spin),
             loads: self.loads.iter().map(load).collect(),
@@ -141,7 +142,7 @@ impl Recovery {
     /// the former frame.
     pub(super) fn without_rigid_motion(&self, taken: &Mat<f64>) -> Self {
         let turned = taken.as_ref().subrows(3, 3).to_owned();
-        let of_motion = |one: &MotionColumns| one.with_modes(Mat::clone, Some(&turned), &self.spin);
+        let of_motion = |columns: &MotionColumns| columns.with_modes(Mat::clone, Some(&turned), &self.spin);
         Self { motion: self.motion.iter().map(of_motion).collect(), ..self.clone() }
     }
 
@@ -149,7 +150,7 @@ impl Recovery {
     pub(super) fn with_modes(&self, change: &ModalChange) -> Self {
         let turned = change.taken().map(|taken| taken.as_ref().subrows(3, 3).to_owned());
         let combined = |rows: &Mat<f64>| change.combined(rows);
-        let of_motion = |one: &MotionColumns| one.with_modes(combined, turned.as_ref(), &self.spin);
+        let of_motion = |columns: &MotionColumns| columns.with_modes(combined, turned.as_ref(), &self.spin);
         Self {
             modes: change.combined(&self.modes),
             motion: self.motion.iter().map(of_motion).collect(),

@@ -61,9 +61,9 @@ pub(super) fn transformed(
     all: Vec<GeometricStiffness<Mat<f64>>>,
     change: &Mat<f64>,
 ) -> Vec<GeometricStiffness<Mat<f64>>> {
-    let one = |one: GeometricStiffness<Mat<f64>>| GeometricStiffness {
-        matrix: gram(change.as_ref(), combine(one.matrix.as_ref(), change.as_ref()).as_ref()),
-        load: one.load,
+    let one = |stiffness: GeometricStiffness<Mat<f64>>| GeometricStiffness {
+        matrix: gram(change.as_ref(), combine(stiffness.matrix.as_ref(), change.as_ref()).as_ref()),
+        load: stiffness.load,
     };
     all.into_iter().map(one).collect()
 }

@@ -68,7 +68,7 @@ impl FlexBody {
     fn softest_motion(&self, omega: &Vector3<f64>) -> Option<(f64, Vec<f64>)> {
         // Stiffness of inertia at this spin, from its six components.
         let inertia = self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness);
-        let spins = inertia.filter(|one| one.load.kind == LoadKind::Spin);
+        let spins = inertia.filter(|stiffness| stiffness.load.kind == LoadKind::Spin);
         let of_inertia = spins.fold(None, |sum: Option<Mat<f64>>, one| {
             let (k, l) = LoadKind::SPIN[one.load.component];
             let term = &one.matrix * Scale(omega[k] * omega[l]);
@@ -88,10 +88,10 @@ impl FlexBody {
         };
         // W2 contributes w_a w_b q'W2_ab q, the stiffness of inertia is subtracted.
         let mut parts = Matrix3::from_fn(|a, b| quadratic(&|i, j| w2[(a * nf + i, b * nf + j)]));
-        for one in self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness) {
-            if one.load.kind == LoadKind::Spin {
-                let (k, l) = LoadKind::SPIN[one.load.component];
-                parts[(k, l)] -= quadratic(&|i, j| one.matrix[(i, j)]);
+        for stiffness in self.inertia_stiffness().into_iter().flat_map(|inertia| &inertia.stiffness) {
+            if stiffness.load.kind == LoadKind::Spin {
+                let (k, l) = LoadKind::SPIN[stiffness.load.component];
+                parts[(k, l)] -= quadratic(&|i, j| stiffness.matrix[(i, j)]);
             }
         }
         Some((parts + parts.transpose()) * 0.5)

@@ -150,8 +150,8 @@ impl FlexBody {
         parts.modes.damping_ratio.clone_from(&held.modes().damping_ratio);
         parts.modes.modal_damping.clone_from(&held.modes().modal_damping);
         // A body with ratios has no static columns of damping forces.
-        let is_of_damping = |one: &MotionColumns| one.load == MotionLoad::Damping;
-        if !held.recoveries().iter().flat_map(|one| &one.motion).any(is_of_damping) {
+        let is_of_damping = |columns: &MotionColumns| columns.load == MotionLoad::Damping;
+        if !held.recoveries().iter().flat_map(|recovery| &recovery.motion).any(is_of_damping) {
             parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
         }
         Self::new(parts)

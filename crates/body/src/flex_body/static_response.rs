@@ -68,24 +68,24 @@ impl FlexBody {
                 }
             }
         };
-        let reduced = |one: &Recovery| {
-            let mut new = one.clone();
-            new.modes = Mat::from_fn(one.rows.len(), kept.len(), |i, j| one.modes[(i, kept[j])]);
+        let reduced = |recovery: &Recovery| {
+            let mut new = recovery.clone();
+            new.modes = Mat::from_fn(recovery.rows.len(), kept.len(), |i, j| recovery.modes[(i, kept[j])]);
             if let Some(spin) = &loads.spin {
-                take_over(one, &mut new.spin, spin, if loses_w1 { &all } else { &dropped });
+                take_over(recovery, &mut new.spin, spin, if loses_w1 { &all } else { &dropped });
             }
-            take_over(one, &mut new.named, &loads.named, &dropped);
+            take_over(recovery, &mut new.named, &loads.named, &dropped);
             for of_motion in &mut new.motion {
                 let responded = loads.motion.iter().find(|(load, _)| *load == of_motion.load);
                 if let Some((load, force)) = responded {
                     let from = if modes_respond(*load, groups) { &dropped } else { &all };
-                    take_over(one, &mut of_motion.columns, force, from);
+                    take_over(recovery, &mut of_motion.columns, force, from);
                 }
                 *of_motion = of_motion.of_modes(kept);
             }
             for at in &mut new.loads {
                 if let Some((_, load)) = loads.at_interfaces.iter().find(|(name, _)| *name == at.interface) {
-                    take_over(one, &mut at.columns, load, &dropped);
+                    take_over(recovery, &mut at.columns, load, &dropped);
                 }
             }
             new
@@ -210,7 +210,7 @@ impl FlexBody {
             let resultant = named[c].resultant();
             named[c].modal[j] - (0..6).map(|k| taken[(k, j)] * resultant[k]).sum::<f64>()
         };
-        let kinds = self.recoveries().iter().flat_map(|one| &one.motion).map(|one| one.load);
+        let kinds = self.recoveries().iter().flat_map(|recovery| &recovery.motion).map(|one| one.load);
         let kinds: BTreeSet<MotionLoad> = kinds.collect();
         let damping = self.damping();
         let of_motion = |load: MotionLoad| Some((load, modal_forces(load, invariants, &damping, &taken)?));

@@ -48,13 +48,13 @@ impl FlexBody {
                 negative_masses: lumped.negative_masses,
             }
         };
-        let stiffness = |one: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
-            load: one.load.clone(),
-            matrix: square(&one.matrix, modes),
+        let stiffness = |stiffness: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
+            load: stiffness.load.clone(),
+            matrix: square(&stiffness.matrix, modes),
         };
-        let rotated = |one: &RotatedStiffness| RotatedStiffness {
-            modes: Mat::from_fn(modes.len(), 3, |i, k| one.modes[(modes[i], k)]),
-            ..one.clone()
+        let rotated = |stiffness: &RotatedStiffness| RotatedStiffness {
+            modes: Mat::from_fn(modes.len(), 3, |i, k| stiffness.modes[(modes[i], k)]),
+            ..stiffness.clone()
         };
         let before = parts.terms.iter().filter(|old| terms.iter().all(|new| new.group != old.group));
         let body = Self::new(Parts {

@@ -203,8 +203,13 @@ impl Problems {
         self.length("inertia_stiffness.moments", inertia.moments.len(), n, "node");
         let numbers = inertia.moments.iter().flat_map(|m| m.first.iter().chain(m.second.iter()).copied());
         self.finite("inertia_stiffness.moments", numbers);
-        for one in &inertia.stiffness {
-            self.matrix(&format!("inertia_stiffness `{}`", one.load.label()), &one.matrix, nf, nf);
+        for stiffness in &inertia.stiffness {
+            self.matrix(
+                &format!("inertia_stiffness `{}`", stiffness.load.label()),
+                &stiffness.matrix,
+                nf,
+                nf,
+            );
         }
         let wanted: Vec<_> = InertiaStiffness::loads(parts.dimension).collect();
         if !inertia.stiffness.iter().map(|one| &one.load).eq(&wanted) {
@@ -214,7 +219,8 @@ impl Problems {
     }
 
     fn geometric_stiffness(&mut self, parts: &Parts, nf: usize) {
-        let labels: Vec<String> = parts.geometric_stiffness.iter().map(|one| one.load.label()).collect();
+        let labels: Vec<String> =
+            parts.geometric_stiffness.iter().map(|stiffness| stiffness.load.label()).collect();
         self.names("geometric stiffness", labels.iter());
         for (one, label) in parts.geometric_stiffness.iter().zip(&labels) {
             self.text("geometric_stiffness", label);
@@ -231,7 +237,8 @@ impl Problems {
     }
 
     fn estimated_stiffness(&mut self, parts: &Parts, nf: usize) {
-        let labels: Vec<String> = parts.estimated_stiffness.iter().map(|one| one.load.label()).collect();
+        let labels: Vec<String> =
+            parts.estimated_stiffness.iter().map(|stiffness| stiffness.load.label()).collect();
         self.names("estimated stiffness", labels.iter());
         for (one, label) in parts.estimated_stiffness.iter().zip(&labels) {
             self.matrix(&format!("estimated_stiffness `{label}`"), &one.matrix, nf, nf);
@@ -250,10 +257,10 @@ impl Problems {
         if !given.iter().map(|one| &one.load).eq(rotated.iter().map(|one| &one.load)) {
             self.add("`rotated_stiffness` has other loads than `geometric_stiffness`".to_owned());
         }
-        for one in rotated {
-            let label = one.load.label();
-            self.matrix(&format!("rotated_stiffness `{label}` of modes"), &one.modes, nf, 3);
-            self.matrix(&format!("rotated_stiffness `{label}` of rotations"), &one.rotation, 3, 3);
+        for stiffness in rotated {
+            let label = stiffness.load.label();
+            self.matrix(&format!("rotated_stiffness `{label}` of modes"), &stiffness.modes, nf, 3);
+            self.matrix(&format!("rotated_stiffness `{label}` of rotations"), &stiffness.rotation, 3, 3);
         }
     }
 
@@ -444,29 +451,29 @@ impl Problems {
     }
 
     fn recoveries(&mut self, parts: &Parts, nf: usize) {
-        self.names("a recovery", parts.recoveries.iter().map(|one| &one.name));
-        for one in &parts.recoveries {
-            let (name, rows) = (format!("recovery `{}`", one.name), one.rows.len());
+        self.names("a recovery", parts.recoveries.iter().map(|recovery| &recovery.name));
+        for recovery in &parts.recoveries {
+            let (name, rows) = (format!("recovery `{}`", recovery.name), recovery.rows.len());
             if rows == 0 {
                 self.add(format!("{name} has no rows"));
             }
-            for row in &one.rows {
+            for row in &recovery.rows {
                 [&row.name, &row.component, &row.unit].into_iter().for_each(|text| self.text(&name, text));
             }
-            self.names(&format!("a row of {name}"), one.rows.iter().map(|row| &row.name));
-            self.length(&format!("{name} offset"), one.offset.len(), rows, "row");
-            self.finite(&format!("{name} offset"), one.offset.iter().copied());
-            self.matrix(&format!("{name} modes"), &one.modes, rows, nf);
-            self.matrix(&format!("{name} spin"), &one.spin, rows, LoadKind::SPIN.len());
-            self.matrix(&format!("{name} named"), &one.named, rows, parts.named_loads.len());
-            for MotionColumns { load, columns } in &one.motion {
+            self.names(&format!("a row of {name}"), recovery.rows.iter().map(|row| &row.name));
+            self.length(&format!("{name} offset"), recovery.offset.len(), rows, "row");
+            self.finite(&format!("{name} offset"), recovery.offset.iter().copied());
+            self.matrix(&format!("{name} modes"), &recovery.modes, rows, nf);
+            self.matrix(&format!("{name} spin"), &recovery.spin, rows, LoadKind::SPIN.len());
+            self.matrix(&format!("{name} named"), &recovery.named, rows, parts.named_loads.len());
+            for MotionColumns { load, columns } in &recovery.motion {
                 self.matrix(&format!("{name} {}", load.name()), columns, rows, load.components() * nf);
             }
-            if one.motion.windows(2).any(|pair| pair[0].load >= pair[1].load) {
+            if recovery.motion.windows(2).any(|pair| pair[0].load >= pair[1].load) {
                 self.add(format!("{name} has columns of motion twice or out of order"));
             }
-            self.names(&format!("an interface of {name}"), one.loads.iter().map(|load| &load.interface));
-            for LoadColumns { interface, columns } in &one.loads {
+            self.names(&format!("an interface of {name}"), recovery.loads.iter().map(|load| &load.interface));
+            for LoadColumns { interface, columns } in &recovery.loads {
                 self.matrix(&format!("{name} loads at `{interface}`"), columns, rows, LOAD_COMPONENTS);
                 let known =
                     parts.interfaces.iter().any(|own| own.name == *interface && own.reference.is_some());

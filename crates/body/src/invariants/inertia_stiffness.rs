@@ -125,8 +125,8 @@ impl InertiaStiffness {
         let first = relative(&|node| node.first.iter().copied().collect());
         let second = relative(&|node| node.second.iter().copied().collect());
         let size = |kind: &LoadKind| {
-            let of_kind = self.stiffness.iter().filter(|one| one.load.kind == *kind);
-            of_kind.map(|one| one.matrix.norm_max()).fold(0.0, f64::max)
+            let of_kind = self.stiffness.iter().filter(|stiffness| stiffness.load.kind == *kind);
+            of_kind.map(|stiffness| stiffness.matrix.norm_max()).fold(0.0, f64::max)
         };
         first.max(second).max(self.difference_of_stiffness(other, &size))
     }
@@ -169,12 +169,12 @@ impl InertiaShares {
     /// motions to the stiffness K_ff of any deformation. Returns `None` if K_ff is not positive definite.
     pub fn of(stiffness: &[GeometricStiffness<Mat<f64>>], modal_stiffness: MatRef<'_, f64>) -> Option<Self> {
         let of_kind = |kind: LoadKind| {
-            let of_kind = stiffness.iter().filter(|one| one.load.kind == kind);
+            let of_kind = stiffness.iter().filter(|stiffness| stiffness.load.kind == kind);
             // w'K w contains both orders of a pair of axes, and the stored matrix is their sum.
             let matrices: Vec<Mat<f64>> = of_kind
-                .map(|one| match (&kind, one.load.component) {
-                    (LoadKind::Spin, 3..) => &one.matrix * faer::Scale(0.5f64.sqrt()),
-                    _ => one.matrix.clone(),
+                .map(|stiffness| match (&kind, stiffness.load.component) {
+                    (LoadKind::Spin, 3..) => &stiffness.matrix * faer::Scale(0.5f64.sqrt()),
+                    _ => stiffness.matrix.clone(),
                 })
                 .collect();
             let matrices: Vec<_> = matrices.iter().map(Mat::as_ref).collect();

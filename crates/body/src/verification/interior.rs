@@ -112,7 +112,8 @@ impl Recomputed<'_> {
     /// Returns the part of K Psi on interior rows that is no combination of M [R Psi]; `None` for a body with fewer modes than
     /// its basis, for which it need not vanish.
     fn residual_of_space(&self, space: &Mat<f64>, interior: &[bool]) -> Option<IdentityCheck> {
-        let held = self.body.interfaces().iter().find(|one| one.coupling != Some(Coupling::Free))?;
+        let held =
+            self.body.interfaces().iter().find(|interface| interface.coupling != Some(Coupling::Free))?;
         if !self.body.is_whole_craig_bampton(&held.name) {
             return None;
         }

@@ -31,8 +31,8 @@ pub(super) fn recovery_checks(
     place: &NodesInFrame,
     modal_stiffness: &Mat<f64>,
 ) -> Result<Vec<IdentityCheck>> {
-    let is_shared = |own: &Recovery| model.recoveries().iter().any(|one| one.name == own.name);
-    let is_named = |own: &NamedLoad| model.named_loads().iter().any(|one| one.name == own.name);
+    let is_shared = |own: &Recovery| model.recoveries().iter().any(|recovery| recovery.name == own.name);
+    let is_named = |own: &NamedLoad| model.named_loads().iter().any(|named_load| named_load.name == own.name);
     if !body.recoveries().iter().any(is_shared) && !body.named_loads().iter().any(is_named) {
         return Ok(Vec::new());
     }
@@ -67,14 +67,14 @@ fn row_differences(stored: &[Recovery], found: &Recovered) -> Vec<f64> {
             differences.push(f64::INFINITY);
             continue;
         }
-        let offset = |one: &Recovery| Mat::from_fn(one.offset.len(), 1, |i, _| one.offset[i]);
+        let offset = |recovery: &Recovery| Mat::from_fn(recovery.offset.len(), 1, |i, _| recovery.offset[i]);
         differences.push(relative(&offset(own), &offset(recomputed), 0.0));
         differences.push(relative(&own.modes, &recomputed.modes, 0.0));
         // Static columns are what the modes leave of a response: they are as accurate as the whole.
         differences.push(relative(&own.spin, &recomputed.spin, of_modes.spin.norm_max()));
         differences.push(relative(&own.named, &recomputed.named, of_modes.named.norm_max()));
         for (at, of_modes) in recomputed.loads.iter().zip(&of_modes.loads) {
-            let stored = own.loads.iter().find(|one| one.interface == at.interface);
+            let stored = own.loads.iter().find(|load| load.interface == at.interface);
             let halves = |columns: &Mat<f64>| [0, 3].map(|first| columns.subcols(first, 3).to_owned());
             if let Some(stored) = stored {
                 let three = halves(&stored.columns).into_iter().zip(halves(&at.columns));
@@ -100,7 +100,7 @@ fn load_differences(stored: &[NamedLoad], found: &[NamedLoad], model: &FeModel) 
             differences.push(f64::INFINITY);
         }
         let column = |values: &[f64]| Mat::from_fn(values.len(), 1, |i, _| values[i]);
-        let moments = |one: &NamedLoad| column(one.moments.as_slice());
+        let moments = |load: &NamedLoad| column(load.moments.as_slice());
         // The resultant of a preload is rounding.
         let nodal = model.named_loads().iter().filter(|load| load.name == recomputed.name);
         let nodal = largest(nodal.flat_map(|load| load.forces.iter().map(|force| force.abs())));

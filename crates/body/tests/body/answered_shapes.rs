@@ -103,9 +103,9 @@ fn recovery_of(shapes: AnsweredShapes) -> ModelRecovery {
 
 /// Returns the largest difference of two recoveries, relative to the largest entry of each of their arrays.
 fn difference(a: &Recovery, b: &Recovery) -> f64 {
-    let columns = |one: &Recovery| -> Vec<Mat<f64>> {
-        let loads = one.loads.iter().map(|at| at.columns.clone());
-        [one.modes.clone(), one.spin.clone()].into_iter().chain(loads).collect()
+    let columns = |recovery: &Recovery| -> Vec<Mat<f64>> {
+        let loads = recovery.loads.iter().map(|at| at.columns.clone());
+        [recovery.modes.clone(), recovery.spin.clone()].into_iter().chain(loads).collect()
     };
     let apart = |(a, b): (Mat<f64>, Mat<f64>)| (&a - &b).norm_max() / b.norm_max();
     columns(a).into_iter().zip(columns(b)).map(apart).fold(0.0, f64::max)
@@ -120,7 +120,7 @@ fn answers_to_the_shapes_of_a_body_give_its_recovery() {
         assert_eq!(columns.len(), 8 + 6 + 12);
         let found = made(recovery_of(shapes), free(), 8, frame).expect("converts");
         assert!(difference(&found.body.recoveries()[0], &expected.recoveries()[0]) < 1e-9);
-        let codes: Vec<Code> = found.diagnostics.iter().map(|one| one.code()).collect();
+        let codes: Vec<Code> = found.diagnostics.iter().map(|diagnostic| diagnostic.code()).collect();
         assert!(codes.contains(&Code::RecoveryMapped), "{codes:?}");
     }
 }
@@ -128,11 +128,11 @@ fn answers_to_the_shapes_of_a_body_give_its_recovery() {
 /// The columns of the inertia of the deformation are steps too; without them the recovery is refused.
 #[test]
 fn answers_have_the_columns_of_the_inertia_of_the_deformation() {
-    let deformed = |one: ModelRecovery| ModelRecovery { deformed_inertia: true, ..one };
+    let deformed = |recovery: ModelRecovery| ModelRecovery { deformed_inertia: true, ..recovery };
     for basis in [free, || BasisChoice::CraigBampton(CraigBampton)] {
         let expected = made(deformed(operator()), basis(), 5, BodyFrame::Principal).expect("converts").body;
         let (shapes, columns) = answered_with(&expected, &model(bracket(operator())), true);
-        assert!(columns.iter().any(|one| one.to_string() == "turning z of mode 2"), "{columns:?}");
+        assert!(columns.iter().any(|column| column.to_string() == "turning z of mode 2"), "{columns:?}");
         let answers = deformed(recovery_of(shapes));
         let found = made(answers, basis(), 5, BodyFrame::Principal).expect("converts").body;
         let (own, other) = (&found.recoveries()[0], &expected.recoveries()[0]);
@@ -219,7 +219,7 @@ fn another_stiffness_of_the_fe_program_is_refused() {
         assert!(error.has(Code::RecoveryEnergy), "{error}");
     }
     let found = made(scaled(1.0, 0.97), free(), 4, BodyFrame::Principal).expect("converts");
-    assert!(found.diagnostics.iter().any(|one| one.code() == Code::RecoveryEnergyDiffers));
+    assert!(found.diagnostics.iter().any(|diagnostic| diagnostic.code() == Code::RecoveryEnergyDiffers));
 }
 
 /// Answers are held to the stiffness where the FE program was given the uniform strains too, and only then.
@@ -249,7 +249,7 @@ fn answers_to_uniform_strains_are_held_to_the_stiffness() {
             Err(error) => error.diagnostics().to_vec(),
         };
         let judged = [Code::RecoveryContradicts, Code::RecoveryUncompared];
-        found.iter().map(|one| one.code()).filter(|code| judged.contains(code)).collect()
+        found.iter().map(|diagnostic| diagnostic.code()).filter(|code| judged.contains(code)).collect()
     };
     assert_eq!(codes(&|_| 1.0, with.clone()), []);
     assert_eq!(codes(&|_| 1.0, with_rigid(with.clone())), []);

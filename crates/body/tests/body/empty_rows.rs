@@ -24,7 +24,12 @@ fn converted(model: &FeModel, modes: usize, method: Method) -> Conversion {
 }
 
 fn told(found: &[Diagnostic], code: Code) -> String {
-    found.iter().find(|one| one.code() == code).unwrap_or_else(|| panic!("{found:?}")).message().to_owned()
+    found
+        .iter()
+        .find(|diagnostic| diagnostic.code() == code)
+        .unwrap_or_else(|| panic!("{found:?}"))
+        .message()
+        .to_owned()
 }
 
 fn block() -> RawModel {
@@ -81,7 +86,7 @@ fn empty_rows_are_left_out_and_told() {
             12 + rotations
         )
     );
-    assert!(diagnostics.iter().all(|one| one.code() != Code::NodesUnused), "{diagnostics:?}");
+    assert!(diagnostics.iter().all(|diagnostic| diagnostic.code() != Code::NodesUnused), "{diagnostics:?}");
     assert_eq!(model.nodes(), plain.nodes());
     assert_eq!((model.stiffness(), model.matrix_rows()), (plain.stiffness(), 6 * (plain.nodes().len() + 2)));
     let [a, b] = [&plain, &model].map(|model| converted(model, 5, Method::Auto).body);

@@ -77,7 +77,10 @@ fn assert_alike(body: &FlexBody, expected: &Invariants, limit: f64) {
 fn check(carrier: &Carrier, with_inertia: bool) {
     let CheckedModel { model, diagnostics, .. } =
         FeModel::from_raw(carrier.raw.clone()).unwrap_or_else(|error| panic!("{error}"));
-    assert!(diagnostics.iter().all(|one| one.code() != Code::MassBlockStructure), "{diagnostics:?}");
+    assert!(
+        diagnostics.iter().all(|diagnostic| diagnostic.code() != Code::MassBlockStructure),
+        "{diagnostics:?}"
+    );
     let conversion = converted(&model, 12);
     let body = &conversion.body;
     assert_eq!(*body.nodes().ids.last().expect("nodes"), POINT);
@@ -97,12 +100,16 @@ fn check(carrier: &Carrier, with_inertia: bool) {
     let shapes = DMatrix::from_rows(&rows);
     let expected = of_points(&masses, &positions, &shapes, body);
     assert_alike(body, &expected, 1e-11);
-    assert!(primary_differences(body.invariants(), body.invariants()).iter().all(|one| one.1 == 0.0));
+    assert!(
+        primary_differences(body.invariants(), body.invariants())
+            .iter()
+            .all(|primary_difference| primary_difference.1 == 0.0)
+    );
     assert_turned(carrier, body, &psi, point_mass);
     // The body agrees with itself and with the model.
     let verified = verify(body, &model).expect("the same model");
     let broken: Vec<_> =
-        body_identities(body).into_iter().chain(verified).filter(|one| !one.passed).collect();
+        body_identities(body).into_iter().chain(verified).filter(|check| !check.passed).collect();
     assert!(broken.is_empty(), "{broken:?}");
     assert_power(&model);
     assert_eq!(with_inertia, carrier.masses[0] != carrier.masses[1]);
@@ -117,8 +124,8 @@ fn assert_turned(carrier: &Carrier, body: &FlexBody, psi: &DMatrix<f64>, mass: f
         0.5 * (theta(j).cross(&theta(k).cross(r)) + theta(k).cross(&theta(j).cross(r)))
     };
     let (mut compared, axis) = (0, |k: usize| Vector3::<f64>::ith(k, 1.0));
-    for one in &body.inertia_stiffness().expect("directors").stiffness {
-        let at = |x: &Vector3<f64>| match (&one.load.kind, one.load.component) {
+    for stiffness in &body.inertia_stiffness().expect("directors").stiffness {
+        let at = |x: &Vector3<f64>| match (&stiffness.load.kind, stiffness.load.component) {
             (LoadKind::Acceleration, k) => Some(axis(k)),
             (LoadKind::AngularAcceleration, k) => Some(axis(k).cross(x)),
             (LoadKind::Spin, k @ 0..3) => Some(axis(k).cross(&axis(k).cross(x))),
@@ -131,9 +138,9 @@ fn assert_turned(carrier: &Carrier, body: &FlexBody, psi: &DMatrix<f64>, mass: f
             carrier.masses.iter().map(of).sum::<f64>()
         });
         if at(&carrier.place).is_some() {
-            let difference = (&one.matrix - &expected).norm_max();
+            let difference = (&stiffness.matrix - &expected).norm_max();
             let size = expected.norm_max().max(mass * turns.amax().powi(2) * carrier.place.norm() * 1e-3);
-            assert!(difference < 1e-9 * size, "{:?}: {difference:.1e} of {size:.1e}", one.load);
+            assert!(difference < 1e-9 * size, "{:?}: {difference:.1e} of {size:.1e}", stiffness.load);
             compared += 1;
         }
     }
@@ -212,11 +219,12 @@ fn a_grid_of_a_solid_that_follows_others_keeps_its_mass() {
         let psi = vectors(&model, &body, &tied);
         let moved = dense(&follower.follows).transpose() * &psi;
         let (labels, old) = (tied.dofs.as_ref().expect("labels"), whole.dofs.as_ref().expect("labels"));
-        let shapes =
-            Mat::from_fn(old.len(), psi.ncols(), |i, j| match labels.iter().position(|one| *one == old[i]) {
+        let shapes = Mat::from_fn(old.len(), psi.ncols(), |i, j| {
+            match labels.iter().position(|label| *label == old[i]) {
                 Some(row) => psi[(row, j)],
                 None => moved[(usize::from(old[i].direction) - 1, j)],
-            });
+            }
+        });
         let nodes: Vec<i64> = old.iter().step_by(3).map(|label| label.node).collect();
         let place = |node: &i64| whole.nodes.ids.iter().position(|id| id == node).expect("a node");
         let positions: Vec<[f64; 3]> = nodes.iter().map(|node| whole.nodes.positions[place(node)]).collect();
@@ -226,8 +234,11 @@ fn a_grid_of_a_solid_that_follows_others_keeps_its_mass() {
         let stiffness = body.invariants().modal_stiffness().clone();
         assert_alike(&body, &condense(&mass, &positions, shapes.as_ref(), stiffness), 1e-11);
         assert_power(&model);
-        let broken: Vec<_> =
-            verify(&body, &model).expect("the same model").into_iter().filter(|one| !one.passed).collect();
+        let broken: Vec<_> = verify(&body, &model)
+            .expect("the same model")
+            .into_iter()
+            .filter(|check| !check.passed)
+            .collect();
         assert!(broken.is_empty(), "{broken:?}");
     }
 }

@@ -18,7 +18,7 @@ use oracle::reference::dense;
 /// Returns the bracket with dashpots between pairs of nodes, and with recoveries that have columns of the inertia of the deformation.
 fn damped_bracket(coupling: Coupling) -> RawModel {
     let mut raw = bracket(&mesh(), coupling);
-    raw.data.recoveries.iter_mut().for_each(|one| one.deformed_inertia = true);
+    raw.data.recoveries.iter_mut().for_each(|recovery| recovery.deformed_inertia = true);
     let n = raw.nodes.len();
     let mut random = Random(17);
     let mut entries = Vec::new();
@@ -86,7 +86,8 @@ fn whole(body: &FlexBody, recovery: &Recovery, load: MotionLoad) -> Mat<f64> {
 
 /// Returns the rows of the static solutions of all nodes (rows x loads): stresses, and T_S'K u of the cut.
 fn exact(raw: &RawModel, statics: &Statics, name: &str, loads: &Mat<f64>) -> Mat<f64> {
-    let operator = &raw.data.recoveries.iter().find(|one| one.name == name).expect("a recovery").operator;
+    let operator =
+        &raw.data.recoveries.iter().find(|recovery| recovery.name == name).expect("a recovery").operator;
     let solved: Vec<Vec<f64>> = (0..loads.ncols())
         .map(|c| {
             let u = statics.solve(&loads.as_ref().subcols(c, 1).to_owned());
@@ -196,7 +197,7 @@ fn columns_are_there_where_they_are_needed() {
     let coupled = |coupling: Coupling, damping: Option<Damping<_>>, basis: BasisChoice, inertia: bool| {
         let mut raw = damped_bracket(coupling);
         raw.data.damping = damping;
-        raw.data.recoveries.iter_mut().for_each(|one| one.deformed_inertia = inertia);
+        raw.data.recoveries.iter_mut().for_each(|recovery| recovery.deformed_inertia = inertia);
         let body = body(raw, basis, 4, BodyFrame::Com);
         body.recoveries()[0].motion.iter().map(|one| one.load).collect::<Vec<_>>()
     };

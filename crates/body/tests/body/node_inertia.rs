@@ -30,7 +30,9 @@ fn warnings(inertia: [f64; 3]) -> [Vec<Diagnostic>; 2] {
     let conversion = convert(&model, &settings, &Context::QUIET).expect("converts");
     let checks = Checks::of(&conversion.body, None).expect("evaluated");
     assert!(checks.passed());
-    let own = |all: Vec<Diagnostic>| all.into_iter().filter(|one| one.code() == Code::NodeInertia).collect();
+    let own = |all: Vec<Diagnostic>| {
+        all.into_iter().filter(|diagnostic| diagnostic.code() == Code::NodeInertia).collect()
+    };
     [own(conversion.diagnostics), own(checks.diagnostics)]
 }
 

@@ -117,7 +117,7 @@ fn static_values(body: &FlexBody, name: &str, case: &Case, columns: bool) -> Vec
     // A frame on an interface does not balance the rigid motion: the modes of such a body follow inertia as well.
     let stiffness = body.invariants().modal_stiffness();
     let q: Vec<f64> = (0..nf).map(|j| load[j] / stiffness[(j, j)]).collect();
-    let recovery = body.recoveries().iter().find(|one| one.name == name).expect("a recovery");
+    let recovery = body.recoveries().iter().find(|recovery| recovery.name == name).expect("a recovery");
     let nothing = [[0.0; 6]; 2];
     let (w, loads) = if columns { (w, at_interfaces.as_slice()) } else { (Vector3::zeros(), &nothing[..]) };
     recovery.values(&RecoveryState { motion: ModalMotion::steady(&q, w), loads, named: &[] })

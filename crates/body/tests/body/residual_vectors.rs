@@ -273,8 +273,8 @@ fn free_modes_know_what_they_lack_at_interfaces() {
         assert!((own.before - exact.before).abs() < 1e-4, "{own:?} {exact:?}");
     }
     assert!(
-        free.truncation.iter().any(|one| one.before > 0.3)
-            && with.truncation.iter().all(|one| one.after < 1e-6)
+        free.truncation.iter().any(|truncation| truncation.before > 0.3)
+            && with.truncation.iter().all(|truncation| truncation.after < 1e-6)
     );
 }
 

@@ -19,7 +19,7 @@ fn converted(model: &FeModel, modes: usize, method: Method) -> Conversion {
 }
 
 fn find(found: &[Diagnostic], code: Code) -> Option<&str> {
-    found.iter().find(|one| one.code() == code).map(Diagnostic::message)
+    found.iter().find(|diagnostic| diagnostic.code() == code).map(Diagnostic::message)
 }
 
 /// Returns the largest deviation of eigenvalues from `expected`, relative.
@@ -52,7 +52,7 @@ fn rotations_held_by_misaligned_elements_follow_in_any_axes_units_and_order() {
             let broken: Vec<_> = body_identities(&converted.body)
                 .into_iter()
                 .chain(verified)
-                .filter(|one| !one.passed)
+                .filter(|check| !check.passed)
                 .collect();
             assert!(broken.is_empty(), "{method:?}: {broken:?}");
         }
@@ -127,7 +127,8 @@ fn flat_with_inertia(inertia: f64, node: usize, model: &FeModel) -> Vec<f64> {
         let label = model.label(row as usize);
         6 * (label.node as usize - 1) + usize::from(label.direction) - 1
     };
-    let rotation = model.soft_rotations().iter().find(|one| row(one.direction[0].0) / 6 == node);
+    let rotation =
+        model.soft_rotations().iter().find(|soft_rotation| row(soft_rotation.direction[0].0) / 6 == node);
     let rotation = rotation.expect("the node is soft");
     let along = rotation.direction.iter().find(|(at, _)| row(*at) % 6 == 5).expect("about z").1;
     let mut follow = DVector::zeros(flat.k.nrows());

@@ -54,9 +54,9 @@ fn turning_rates(body: &FlexBody, spin: f64) -> Vec<f64> {
     let (w2, w3) = (body.invariants().w2().expect("held"), body.invariants().w3().expect("held"));
     let own = body.inertia_stiffness().expect("nodes that turn");
     let stiffening = |i: usize, j: usize| -> f64 {
-        let spins = own.stiffness.iter().filter(|one| one.load.kind == LoadKind::Spin);
+        let spins = own.stiffness.iter().filter(|stiffness| stiffness.load.kind == LoadKind::Spin);
         let along = |component: usize| axis[LoadKind::SPIN[component].0] * axis[LoadKind::SPIN[component].1];
-        spins.map(|one| along(one.load.component) * one.matrix[(i, j)]).sum()
+        spins.map(|spin| along(spin.load.component) * spin.matrix[(i, j)]).sum()
     };
     let softening = |i: usize, j: usize| -> f64 {
         (0..9).map(|at| axis[at / 3] * w2[((at / 3) * n + i, (at % 3) * n + j)] * axis[at % 3]).sum()

@@ -138,7 +138,7 @@ fn the_stress_of_a_turning_beam_has_the_effect_on_bending_that_theory_gives() {
     let beam = converted(shaft(24, 0.02), BodyFrame::Com);
     // Bending along the axis of the spin, z: T w'^2 with T = m w^2 (1/4 - x^2) / 2, for mass 1 and length 1.
     let estimate = beam.estimated_stiffness();
-    let about = estimate.iter().find(|one| one.load.component == 2).expect("spin zz");
+    let about = estimate.iter().find(|stiffness| stiffness.load.component == 2).expect("spin zz");
     let s = beam.invariants().s().expect("a solid's sums");
     let mode = (0..beam.n_modes()).find(|&j| s[2][2][(j, j)] > 0.9).expect("bends along z");
     let k = 4.730_040_744_862_704f64;

@@ -190,8 +190,10 @@ fn the_stress_stiffness_of_every_load_is_that_of_other_element_code() {
     for (kind, name) in KINDS {
         let bar = Bar::new(kind, name);
         let (own, given) = (body_of(bar.raw.clone(), ALL), body_of(bar.stressed(), StressLoads::default()));
-        let loads: Vec<&UnitLoad> = own.geometric_stiffness().iter().map(|one| &one.load).collect();
-        let expected: Vec<&UnitLoad> = given.geometric_stiffness().iter().map(|one| &one.load).collect();
+        let loads: Vec<&UnitLoad> =
+            own.geometric_stiffness().iter().map(|stiffness| &stiffness.load).collect();
+        let expected: Vec<&UnitLoad> =
+            given.geometric_stiffness().iter().map(|stiffness| &stiffness.load).collect();
         assert_eq!(loads, expected, "{name}");
         assert_eq!(loads.len(), 6 + 12 + 1, "{name}");
         for (own, given) in own.geometric_stiffness().iter().zip(given.geometric_stiffness()) {
@@ -213,7 +215,7 @@ fn a_stated_stress_stiffness_is_kept_and_only_wanted_loads_are_computed() {
     let [stated] = &raw.data.geometric_stiffness[..] else { panic!("one") };
     let stated = stated.load.clone();
     let body = body_of(raw, StressLoads { interfaces: true, ..StressLoads::default() });
-    let loads: Vec<&UnitLoad> = body.geometric_stiffness().iter().map(|one| &one.load).collect();
+    let loads: Vec<&UnitLoad> = body.geometric_stiffness().iter().map(|stiffness| &stiffness.load).collect();
     assert_eq!(loads.len(), 1 + 12);
     assert_eq!(*loads[0], stated);
 }
@@ -244,7 +246,7 @@ fn stresses_at_nodes_become_a_recovery_with_static_columns() {
     let shapes =
         DMatrix::from_fn(3 * bar.mesh.nodes.len(), body.n_modes(), |i, j| body.modes().shape[(i, j)]);
     let amplitudes = modal.lu().solve(&(shapes.transpose() * &forces)).expect("stiff");
-    let column = &recovery.loads.iter().find(|one| one.interface == "tip").expect("the tip").columns;
+    let column = &recovery.loads.iter().find(|load| load.interface == "tip").expect("the tip").columns;
     for row in 0..recovery.rows.len() {
         let of_modes: f64 = (0..body.n_modes()).map(|j| recovery.modes[(row, j)] * amplitudes[j]).sum();
         let found = of_modes + column[(row, 0)];

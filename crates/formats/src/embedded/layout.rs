@@ -387,13 +387,13 @@ pub(crate) fn loads<'b>(
     if !is_reference {
         return Vec::new();
     }
-    let at = |one: &GeometricStiffness<Mat<f64>>| match &one.load.kind {
-        LoadKind::Force(at) if at == name => Some(one.load.component),
-        LoadKind::Moment(at) if at == name && frame.rotation.is_some() => Some(3 + one.load.component),
+    let at = |stiffness: &GeometricStiffness<Mat<f64>>| match &stiffness.load.kind {
+        LoadKind::Force(at) if at == name => Some(stiffness.load.component),
+        LoadKind::Moment(at) if at == name && frame.rotation.is_some() => Some(3 + stiffness.load.component),
         _ => None,
     };
     let mut found: Vec<_> =
-        body.geometric_stiffness().iter().filter_map(|one| Some((at(one)?, one))).collect();
+        body.geometric_stiffness().iter().filter_map(|stiffness| Some((at(stiffness)?, stiffness))).collect();
     found.sort_by_key(|(bit, _)| *bit);
     found
 }

@@ -123,7 +123,7 @@ pub(crate) fn geometric_stiffness(
     holds: impl Fn(&UnitLoad) -> bool,
 ) -> Holding {
     let lost: Vec<GeometricStiffness<Mat<f64>>> =
-        body.geometric_stiffness().iter().filter(|one| !holds(&one.load)).cloned().collect();
+        body.geometric_stiffness().iter().filter(|stiffness| !holds(&stiffness.load)).cloned().collect();
     if lost.is_empty() {
         return Held;
     }
@@ -145,15 +145,15 @@ fn from_one_percent(body: &FlexBody, what: &str, lost: &[GeometricStiffness<Mat<
     };
     let rates = body.rates_of(&shares, REPORTED_STIFFNESS).in_words(body.units(), |_| true);
     // Loads at interfaces and named loads, each by its size.
-    let at_place = lost.iter().filter_map(|one| {
-        let share = relative_norm(one.matrix.as_ref(), own.as_ref()).filter(|share| *share > 0.0)?;
+    let at_place = lost.iter().filter_map(|stiffness| {
+        let share = relative_norm(stiffness.matrix.as_ref(), own.as_ref()).filter(|share| *share > 0.0)?;
         let size = significant(REPORTED_STIFFNESS / share, 3);
         let units = body.units();
         let (mass, length, time) = (units.mass.name(), units.length.name(), units.time.name());
-        match one.load.kind {
-            LoadKind::Force(_) => Some(format!("{} of {size} {mass} {length}/{time}^2", one.load)),
-            LoadKind::Moment(_) => Some(format!("{} of {size} {mass} {length}^2/{time}^2", one.load)),
-            LoadKind::Named(_) => Some(format!("{size} times {}", one.load)),
+        match stiffness.load.kind {
+            LoadKind::Force(_) => Some(format!("{} of {size} {mass} {length}/{time}^2", stiffness.load)),
+            LoadKind::Moment(_) => Some(format!("{} of {size} {mass} {length}^2/{time}^2", stiffness.load)),
+            LoadKind::Named(_) => Some(format!("{size} times {}", stiffness.load)),
             _ => None,
         }
     });
@@ -194,7 +194,8 @@ pub(crate) fn inertia_stiffness(
     holds: impl Fn(&UnitLoad) -> bool,
 ) -> Holding {
     let lost = |body: &FlexBody| {
-        let all = body.inertia_stiffness()?.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
+        let all =
+            body.inertia_stiffness()?.stiffness.iter().filter(|stiffness| stiffness.matrix.norm_max() > 0.0);
         Some(all.filter(|one| !holds(&one.load)).cloned().collect::<Vec<_>>())
     };
     match lost(body) {
@@ -220,7 +221,7 @@ pub(crate) fn in_motion(
         let share = lost(&case.body).map_or(Some(0.0), |lost| case.largest_share(&lost));
         (share.unwrap_or(f64::INFINITY), &case.scene)
     });
-    if let Some((share, scene)) = first_largest(shares, |one| one.0) {
+    if let Some((share, scene)) = first_largest(shares, |pair| pair.0) {
         let error = if share < 1.0 { share / (1.0 - share) } else { f64::INFINITY };
         let percent = |error: f64| format!("{} %", significant(100.0 * error, 2));
         let size = if error.is_finite() {

@@ -73,8 +73,8 @@ impl<'b> NodalStresses<'b> {
         let others: Vec<String> = body
             .recoveries()
             .iter()
-            .filter(|one| one.name != own.recovery.name)
-            .map(|one| format!("`{}`", one.name))
+            .filter(|recovery| recovery.name != own.recovery.name)
+            .map(|recovery| format!("`{}`", recovery.name))
             .collect();
         if !others.is_empty() {
             lost.push(format!("the recoveries {}", others.join(", ")));

@@ -148,8 +148,8 @@ impl ModalCoordinates {
         let invariants = sound_invariants(given)?;
         let turns = given.frames.iter().any(|frame| frame.rotation.is_some());
         let mut geometric_stiffness = given.geometric_stiffness.clone();
-        for one in &mut geometric_stiffness {
-            one.matrix = symmetric_part(&one.matrix);
+        for stiffness in &mut geometric_stiffness {
+            stiffness.matrix = symmetric_part(&stiffness.matrix);
         }
         Ok(Self {
             invariants,
@@ -171,7 +171,10 @@ impl ModalCoordinates {
             geometric_stiffness: self
                 .geometric_stiffness
                 .into_iter()
-                .map(|one| GeometricStiffness { matrix: change.congruent(&one.matrix), load: one.load })
+                .map(|stiffness| GeometricStiffness {
+                    matrix: change.congruent(&stiffness.matrix),
+                    load: stiffness.load,
+                })
                 .collect(),
         }
     }

@@ -472,10 +472,9 @@ fn places(body: &FlexBody, points: &crate::export::Points) -> Vec<StiffenedFrame
     let frames = frames(body, points);
     let stresses = NodalStresses::new(body, frames.iter().map(|frame| frame.id));
     let place = |(at, frame): (usize, ExportFrame)| {
-        let interface = body
-            .interfaces()
-            .iter()
-            .find(|one| Some(&one.name) == frame.name.as_ref() && one.reference == Some(frame.position));
+        let interface = body.interfaces().iter().find(|interface| {
+            Some(&interface.name) == frame.name.as_ref() && interface.reference == Some(frame.position)
+        });
         let stiffness_for = |kind: fn(String) -> LoadKind| {
             interface.and_then(|interface| stiffness(body, &kind(interface.name.clone())))
         };

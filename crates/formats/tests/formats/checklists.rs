@@ -64,7 +64,10 @@ const PROPERTIES: &[Property] = &[
         moves: true,
         remove: |parts| {
             parts.named_loads.clear();
-            parts.recoveries.iter_mut().for_each(|one| one.named = Mat::zeros(one.rows.len(), 0));
+            parts
+                .recoveries
+                .iter_mut()
+                .for_each(|recovery| recovery.named = Mat::zeros(recovery.rows.len(), 0));
         },
         entry: |list| &list.named_loads,
     },
@@ -114,7 +117,7 @@ fn body_with_everything() -> FlexBody {
     parts.modes.damping_ratio.fill(0.02);
     let load = UnitLoad { kind: LoadKind::Acceleration, component: 0 };
     parts.rotated_stiffness.clear();
-    parts.geometric_stiffness.retain(|one| one.load != load);
+    parts.geometric_stiffness.retain(|stiffness| stiffness.load != load);
     let matrix = Mat::from_fn(nf, nf, |i, j| 1e-3 * ((i + j) as f64 + 1.0));
     parts.geometric_stiffness.push(GeometricStiffness { load, matrix });
     parts.modes.internal =

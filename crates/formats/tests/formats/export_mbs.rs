@@ -44,7 +44,7 @@ fn written(body: &FlexBody, format: &str, options: &ExportOptions) -> (Vec<u8>, 
         export(body, find_format(format).expect("a format"), options, true).expect("written");
     // A program that joins the interfaces, or a table of their numbers.
     let are_named =
-        flexbody_formats::export::frames(body, &options.points).iter().any(|one| one.name.is_some());
+        flexbody_formats::export::frames(body, &options.points).iter().any(|frame| frame.name.is_some());
     let beside = match format {
         "exudyn" => true,
         "mbsim" => are_named,
@@ -525,7 +525,8 @@ fn damping_and_geometric_stiffness_are_held_where_there_is_a_place() {
     let found = read(&bytes, "mbdyn").body;
     assert_eq!(found.modal_damping.as_ref(), Some(&damping));
     let named = |load: &UnitLoad| matches!(load.kind, LoadKind::Named(_));
-    let held: Vec<_> = body.geometric_stiffness().iter().filter(|one| !named(&one.load)).cloned().collect();
+    let held: Vec<_> =
+        body.geometric_stiffness().iter().filter(|stiffness| !named(&stiffness.load)).cloned().collect();
     assert_eq!(found.geometric_stiffness, held);
 
     let (bytes, losses) = written(&body, "mbsim", &ExportOptions::default());
@@ -610,8 +611,8 @@ fn mbdyn_says_what_its_input_must_have() {
     let needs = |body: &FlexBody, dialect: &str| -> Vec<String> {
         let mbdyn = find_format("mbdyn").expect("a format");
         let (_, told) = export(body, mbdyn, &options(dialect, Points::Usual), true).expect("written");
-        let needs = told.iter().filter(|one| one.code() == Code::ExportNeeds);
-        needs.map(|one| one.message().to_owned()).collect()
+        let needs = told.iter().filter(|diagnostic| diagnostic.code() == Code::ExportNeeds);
+        needs.map(|need| need.message().to_owned()).collect()
     };
     let spun = stressed(plain.clone(), &[LoadKind::Spin], 1.0, &mut Random(4));
     let second = plain.interfaces()[1].name.clone();

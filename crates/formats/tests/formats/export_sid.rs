@@ -76,7 +76,7 @@ fn same(a: &Mat<f64>, b: &Mat<f64>, what: &str) {
 }
 
 fn stiffness(body: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad) -> Option<Mat<f64>> {
-    body.iter().find(|one| one.load == *load).map(|one| one.matrix.clone())
+    body.iter().find(|one| one.load == *load).map(|stiffness| stiffness.matrix.clone())
 }
 
 /// Arrays of the text, read by the test itself.
@@ -484,8 +484,8 @@ fn what_cannot_be_held_is_told() {
     let body = fixture("bracket_hex20", MODES, BodyFrame::Model);
     let body = stressed(body, &[LoadKind::Named("bolts".to_owned())], 1.0, &mut Random(2));
     let (_, warnings) = export(&body, sid(), &ExportOptions::default(), false).expect("with the loss");
-    assert!(warnings.iter().any(|one| one.message().contains("times load `bolts`")), "{warnings:?}");
-    let lost = warnings.iter().filter(|one| one.code() == Code::ExportLost);
+    assert!(warnings.iter().any(|warning| warning.message().contains("times load `bolts`")), "{warnings:?}");
+    let lost = warnings.iter().filter(|warning| warning.code() == Code::ExportLost);
     assert_eq!(lost.count(), 1, "{warnings:?}");
 }
 

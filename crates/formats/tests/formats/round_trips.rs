@@ -158,8 +158,10 @@ fn what_is_written_comes_back() {
             // SID stores W2 and the geometric stiffness for spin as a sum, which is read back as the latter;
             // the equations are equal.
             let joined = back.groups() != body.groups();
-            for one in
-                back.geometric_stiffness().iter().filter(|one| !(joined && one.load.kind == LoadKind::Spin))
+            for one in back
+                .geometric_stiffness()
+                .iter()
+                .filter(|stiffness| !(joined && stiffness.load.kind == LoadKind::Spin))
             {
                 // The stiffness of inertia of rotating nodes is read back as geometric stiffness.
                 let own = body.stiffness_under(&one.load).map(|own| match format.name() {

@@ -35,7 +35,12 @@ fn written(format: &str, body: &FlexBody, points: Points) -> (tempfile::NamedTem
         .expect("an export");
     let file = tempfile::NamedTempFile::new().expect("a file");
     std::fs::write(file.path(), &exported.file).expect("written");
-    (file, said.iter().map(|one| format!("{}: {}", one.code().id(), one.message())).collect())
+    (
+        file,
+        said.iter()
+            .map(|diagnostic| format!("{}: {}", diagnostic.code().id(), diagnostic.message()))
+            .collect(),
+    )
 }
 
 #[test]
@@ -112,7 +117,7 @@ fn formats_without_a_place_say_so() {
 #[test]
 fn numbers_of_interfaces_are_told() {
     let body = body();
-    let names: Vec<&str> = body.interfaces().iter().map(|one| one.name.as_str()).collect();
+    let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
     assert!(!names.is_empty());
     for format in ["sid", "mbsim"] {
         let (_, said) = written(format, &body, Points::Usual);

@@ -62,7 +62,7 @@ pub(super) fn read_hdf5(file: &InputFile) -> Diagnosed<StepValues> {
     let (nodes, displacements, stresses) = (array("nodes")?, array("displacements")?, array("stresses")?);
     let energies = match read_array(file, Some("strain_energy")) {
         Ok(energies) => Some(energies.values),
-        Err(found) if found.iter().all(|one| one.code() == Code::Hdf5Layout) => None,
+        Err(found) if found.iter().all(|diagnostic| diagnostic.code() == Code::Hdf5Layout) => None,
         Err(found) => return Err(about(found)),
     };
     let n = nodes.values.len();

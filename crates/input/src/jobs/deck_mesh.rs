@@ -189,7 +189,8 @@ impl Scopes {
     /// Returns the model of all instances. Node numbers are kept if no two instances share one; else every instance
     /// gets a separate range of numbers.
     fn assembled(self, keep_scopes: bool) -> Diagnosed<DeckMesh> {
-        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.scope)).collect();
+        let placed: Vec<(&Instance, &Scope)> =
+            self.instances.iter().map(|instance| (instance, &instance.scope)).collect();
         let mut taken: HashSet<i64> = self.top.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
         let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);

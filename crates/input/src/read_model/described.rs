@@ -67,7 +67,7 @@ fn merge(all: &mut DescribedElements, more: DescribedElements) {
     let direct = more.direct.into_iter().filter(|one| !all.direct.contains(one)).collect::<Vec<_>>();
     all.direct.extend(direct);
     let known: HashSet<(i64, u8)> = all.equations.iter().map(|equation| equation.dependent).collect();
-    all.equations.extend(more.equations.into_iter().filter(|one| !known.contains(&one.dependent)));
+    all.equations.extend(more.equations.into_iter().filter(|equation| !known.contains(&equation.dependent)));
     let others = more.not_described.into_iter().filter(|one| !all.not_described.contains(one));
     let others = others.collect::<Vec<_>>();
     all.not_described.extend(others);

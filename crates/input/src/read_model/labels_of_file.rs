@@ -35,7 +35,8 @@ impl LabelsOfFile {
         // Rows of CalculiX have their labels in a file beside the matrix.
         let is_unlabelled =
             |one: &&StressStiffnessSource| one.with_stress.as_ref().is_none_or(|with| with.dofs.is_none());
-        let of_stress = files.geometric_stiffness.iter().map(|one| &one.matrix).filter(is_unlabelled);
+        let of_stress =
+            files.geometric_stiffness.iter().map(|stiffness| &stiffness.matrix).filter(is_unlabelled);
         let of_stress = of_stress.map(|one| (MatrixRole::GeometricStiffness, &one.location));
         let all = mass.into_iter().chain(damping).chain(of_stress);
         all.filter_map(|(role, location)| Self::of(location, role, opened)).collect()

@@ -82,7 +82,7 @@ pub(super) fn moving(
     dimension: u8,
 ) -> Option<HashSet<i64>> {
     let n = matrices[0].matrix.n_cols();
-    let filled = filled_rows(matrices.map(|one| &one.matrix), n);
+    let filled = filled_rows(matrices.map(|matrix| &matrix.matrix), n);
     let d = usize::from(dimension);
     let node_of = |row: usize| match labels {
         Some(labels) => labels.get(row).map(|label| label.node),

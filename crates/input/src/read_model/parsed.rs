@@ -130,10 +130,10 @@ impl Parsed {
         let mesh = files.mesh.as_ref().map(|path| read_node_file(opened.get(path)?, files.dimension));
         let damping = files.damping.as_ref();
         let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
-        let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
+        let geometric_stiffness = files.geometric_stiffness.iter().map(|stiffness| {
             let other = |location: &MatrixLocation| matrix(location, MatrixRole::GeometricStiffness);
-            let matrix = read_stress_matrix(&one.matrix, |path| opened.get(path), other)?;
-            Ok(GeometricStiffness { load: one.load.clone(), matrix })
+            let matrix = read_stress_matrix(&stiffness.matrix, |path| opened.get(path), other)?;
+            Ok(GeometricStiffness { load: stiffness.load.clone(), matrix })
         });
         let geometric_stiffness = geometric_stiffness.collect();
         Self { matrices, mesh, damping, geometric_stiffness, labels }

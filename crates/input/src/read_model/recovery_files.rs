@@ -28,7 +28,9 @@ pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Diagnosed<O
 
 /// Returns the diagnostics with the file, where they name none.
 fn in_file(found: Vec<Diagnostic>, file: &InputFile) -> Vec<Diagnostic> {
-    let located = |one: Diagnostic| if one.file().is_none() { one.in_file(file.path()) } else { one };
+    let located = |diagnostic: Diagnostic| {
+        if diagnostic.file().is_none() { diagnostic.in_file(file.path()) } else { diagnostic }
+    };
     found.into_iter().map(located).collect()
 }
 

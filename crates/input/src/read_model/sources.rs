@@ -23,7 +23,7 @@ pub(super) fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles.extend(files.elements.iter().map(|elements| ("elements", elements.path.as_path())));
     let damping = files.damping.as_ref().and_then(Damping::matrix);
     roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
-    let geometric = files.geometric_stiffness.iter().flat_map(|one| one.matrix.files());
+    let geometric = files.geometric_stiffness.iter().flat_map(|stiffness| stiffness.matrix.files());
     roles.extend(geometric.map(|path| (MatrixRole::GeometricStiffness.name(), path)));
     roles.extend(files.interfaces.iter().filter_map(|interface| match &interface.nodes {
         InterfaceNodes::File(path) => Some(("interface", path.as_path())),

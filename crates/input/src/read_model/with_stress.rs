@@ -184,7 +184,7 @@ fn column_difference(a: &CscMatrix, b: &CscMatrix, j: usize, rounded: f64) -> Ve
 
 /// Returns a note with the digits of geometric stiffness that is a difference; `None` if none is.
 pub(super) fn difference_note(differences: &[(f64, UnitLoad)]) -> Option<Diagnostic> {
-    let (digits, load) = first_smallest(differences, |one| one.0)?;
+    let (digits, load) = first_smallest(differences, |pair| pair.0)?;
     let count = differences.len();
     let message = format!(
         "geometric stiffness of {count} load{} is the difference of two stiffness matrices; {digits:.1} digits are left, the fewest for {load}",

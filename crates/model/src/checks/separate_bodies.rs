@@ -177,8 +177,11 @@ fn body_model(
     let geometric_stiffness = all
         .geometric_stiffness
         .iter()
-        .map(|one| GeometricStiffness { load: one.load.clone(), matrix: one.matrix.principal(kept) })
-        .filter(|one| one.matrix.as_csc().nnz() > 0)
+        .map(|stiffness| GeometricStiffness {
+            load: stiffness.load.clone(),
+            matrix: stiffness.matrix.principal(kept),
+        })
+        .filter(|stiffness| stiffness.matrix.as_csc().nnz() > 0)
         .collect();
     let name = format!("{}-{}", all.description.name, number.number);
     let own: HashSet<i64> = nodes.ids.iter().copied().collect();

@@ -43,13 +43,13 @@ pub(crate) fn check_stress(
     }
     let loads = UnitLoads::new(model);
     for GeometricStiffness { load, matrix } in given {
-        let file = files.iter().find(|one| one.load == *load).map(|one| &one.matrix);
+        let file = files.iter().find(|file| file.load == *load).map(|file| &file.matrix);
         let digits = file.map_or(17, |file| file.digits);
         let relations = Relations::new(model, matrix, solid, digits);
         let judged = Judged { model, load, relations };
         let diagnostic = judged.softening(matrix).or_else(|| judged.motion()).or_else(|| judged.load(&loads));
         let path = file.map_or(Path::new(""), |file| &file.path);
-        found.extend(diagnostic.map(|one| one.in_file(path)));
+        found.extend(diagnostic.map(|diagnostic| diagnostic.in_file(path)));
     }
 }
 
@@ -330,9 +330,9 @@ fn blocks_of(matrix: &SymmetricMatrix, d: usize, i: usize) -> Vec<(usize, Matrix
     for axis in 0..d {
         let (columns, values) = matrix.row(d * i + axis);
         let entry = |(&column, &value): (&u32, &f64)| (column as usize / d, axis, column as usize % d, value);
-        entries.extend(columns.iter().zip(values).map(entry).filter(|one| one.0 != i));
+        entries.extend(columns.iter().zip(values).map(entry).filter(|pair| pair.0 != i));
     }
-    entries.sort_unstable_by_key(|one| one.0);
+    entries.sort_unstable_by_key(|pair| pair.0);
     let block = |same: &[(usize, usize, usize, f64)]| {
         let mut block = Matrix3::zeros();
         same.iter().for_each(|&(_, a, b, value)| block[(a, b)] = value);

@@ -238,7 +238,9 @@ impl<'m> UnitLoads<'m> {
 
     /// Returns the smallest error of the hypotheses about `forces`.
     fn least(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], all: &[Explained]) -> f64 {
-        let error = |one: &Explained| larger(one.error, self.unexplained(forces, load, &one.acceleration));
+        let error = |explained: &Explained| {
+            larger(explained.error, self.unexplained(forces, load, &explained.acceleration))
+        };
         all.iter().map(error).fold(f64::INFINITY, f64::min)
     }
 
@@ -253,7 +255,7 @@ impl<'m> UnitLoads<'m> {
         let floor = ROUNDING_LOAD * self.inertia();
         let size_of = |i: usize| larger(net[i].norm(), forces[i].norm());
         let largest = (0..net.len()).map(size_of).fold(0.0, larger);
-        let loaded = nodes.iter().filter(|one| size_of(one.1) > ROUNDING_LOAD * largest);
+        let loaded = nodes.iter().filter(|node| size_of(node.1) > ROUNDING_LOAD * largest);
         let mut ratios: Vec<f64> = loaded.map(|&(rest, i)| rest / size_of(i)).collect();
         ratios.sort_by(f64::total_cmp);
         let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);

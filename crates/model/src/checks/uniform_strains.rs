@@ -52,8 +52,9 @@ pub(crate) fn check_stresses(
     found: &mut Vec<Diagnostic>,
 ) {
     let mut strained = None;
-    for one in model.recoveries() {
-        let (RecoveryOperator::Rows { labels, .. } | RecoveryOperator::Shapes { labels, .. }) = &one.operator
+    for recovery in model.recoveries() {
+        let (RecoveryOperator::Rows { labels, .. } | RecoveryOperator::Shapes { labels, .. }) =
+            &recovery.operator
         else {
             continue;
         };
@@ -68,10 +69,10 @@ pub(crate) fn check_stresses(
             false if model.dimension() != 3 => Err("the model is plane".to_owned()),
             false => {
                 let strained = strained.get_or_insert_with(|| UniformStrains::new(model, density));
-                strained.outcome(model, &one.operator, &points)
+                strained.outcome(model, &recovery.operator, &points)
             }
         };
-        found.extend(finding(one, compared, allowed));
+        found.extend(finding(recovery, compared, allowed));
     }
 }
 

@@ -164,7 +164,7 @@ impl DirectorMass {
             (value < -NEGATIVE_MOMENT * size).then_some((self.nodes[place], value))
         };
         let negative: Vec<_> = (0..self.nodes.len()).filter_map(smallest).collect();
-        let (node, value) = first_largest(negative.iter().copied(), |one| -one.1)?;
+        let (node, value) = first_largest(negative.iter().copied(), |pair| -pair.1)?;
         Some((node, value, negative.len()))
     }
 

@@ -118,7 +118,9 @@ impl Followers {
             first += labels.len();
         }
         let is_moved = |sum: &Sum| sum.iter().all(|(row, _)| (*row as usize) < own[0] + own[1]);
-        let sums = all.iter().flat_map(|one| one.displacement.iter().chain(one.rotation.iter().flatten()));
+        let sums = all
+            .iter()
+            .flat_map(|follower| follower.displacement.iter().chain(follower.rotation.iter().flatten()));
         if all.is_empty() || !sums.into_iter().all(is_moved) {
             return None;
         }
@@ -139,15 +141,15 @@ impl Followers {
 
     /// Returns true if a point has rotations.
     pub fn turn(&self) -> bool {
-        self.all.iter().any(|one| one.rotation.is_some())
+        self.all.iter().any(|follower| follower.rotation.is_some())
     }
 
     /// Returns displacements and rotations of the points (three each, zero for points without rotations) for the
     /// displacements `u` of the rows of the model.
     pub fn motion(&self, u: &[f64]) -> [Vec<f64>; 2] {
         let displacements = self.all.iter().flat_map(|one| one.displacement.iter().map(|sum| value(sum, u)));
-        let rotations = self.all.iter().flat_map(|one| {
-            (0..3).map(|k| one.rotation.as_ref().map_or(0.0, |rotation| value(&rotation[k], u)))
+        let rotations = self.all.iter().flat_map(|follower| {
+            (0..3).map(|k| follower.rotation.as_ref().map_or(0.0, |rotation| value(&rotation[k], u)))
         });
         [displacements.collect(), rotations.collect()]
     }
@@ -197,7 +199,11 @@ impl Followers {
         full.extend(self.all.iter().flat_map(|one| one.centre.iter().map(|sum| value(sum, x))));
         full.extend_from_slice(&x[displacements..displacements + rotations]);
         full.extend(
-            self.all.iter().filter_map(|one| one.rotation.as_ref()).flatten().map(|sum| value(sum, x)),
+            self.all
+                .iter()
+                .filter_map(|follower| follower.rotation.as_ref())
+                .flatten()
+                .map(|sum| value(sum, x)),
         );
         full
     }
@@ -210,7 +216,8 @@ impl Followers {
         let (turning, moments) = rest.split_at(rotations);
         forces.iter_mut().zip(head.iter().chain(turning)).for_each(|(force, full)| *force += full);
         let of_centres = self.all.iter().flat_map(|one| &one.centre).zip(centres);
-        let of_turns = self.all.iter().filter_map(|one| one.rotation.as_ref()).flatten().zip(moments);
+        let of_turns =
+            self.all.iter().filter_map(|follower| follower.rotation.as_ref()).flatten().zip(moments);
         for (sum, force) in of_centres.chain(of_turns) {
             sum.iter().for_each(|&(row, weight)| forces[row as usize] += weight * force);
         }

@@ -100,7 +100,8 @@ fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
         found.push(Diagnostic::new(Code::ManifestSyntax, problem));
     }
     let damping = raw.data.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
-    let geometric = raw.data.geometric_stiffness.iter().map(|one| (&one.matrix, GEOMETRIC_STIFFNESS));
+    let geometric =
+        raw.data.geometric_stiffness.iter().map(|stiffness| (&stiffness.matrix, GEOMETRIC_STIFFNESS));
     for (other, name) in damping.into_iter().chain(geometric) {
         check_matrix(other, name, found);
         let rows = other.matrix.n_cols();
@@ -242,9 +243,9 @@ impl InternalOrder<'_> {
         &mut self,
         given: &mut [GeometricStiffness<RawMatrix>],
     ) -> Vec<GeometricStiffness<SymmetricMatrix>> {
-        let ordered = |one: &mut GeometricStiffness<RawMatrix>| {
-            let matrix = self.symmetric(&mut one.matrix, GEOMETRIC_STIFFNESS)?;
-            Some(GeometricStiffness { load: one.load.clone(), matrix })
+        let ordered = |stiffness: &mut GeometricStiffness<RawMatrix>| {
+            let matrix = self.symmetric(&mut stiffness.matrix, GEOMETRIC_STIFFNESS)?;
+            Some(GeometricStiffness { load: stiffness.load.clone(), matrix })
         };
         given.iter_mut().filter_map(ordered).collect()
     }

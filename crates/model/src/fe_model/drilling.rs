@@ -94,23 +94,30 @@ pub(crate) fn with_following_rotations(
         return unchanged(stiffness, mass);
     }
     let found = [false, true].into_iter().filter_map(|soft| remark(&followers, nodes, soft));
-    let found = found.map(|one| one.in_file(&raw.stiffness.path)).collect();
-    let added: Vec<(u32, u32, f64)> =
-        followers.iter().flat_map(|one| square(&one.rotation.term, one.rotation.stiffness)).collect();
+    let found = found.map(|diagnostic| diagnostic.in_file(&raw.stiffness.path)).collect();
+    let added: Vec<(u32, u32, f64)> = followers
+        .iter()
+        .flat_map(|follower| square(&follower.rotation.term, follower.rotation.stiffness))
+        .collect();
     let held = sum(&stiffness, &added);
     let rounded = raw.mass.digits < FULL_DIGITS;
-    let without_mass = followers.iter().filter(|one| rounded && !one.has_mass);
-    let left: Vec<(u32, u32, f64)> = without_mass.flat_map(|one| rest(&mass, &one.rotation)).collect();
+    let without_mass = followers.iter().filter(|follower| rounded && !follower.has_mass);
+    let left: Vec<(u32, u32, f64)> =
+        without_mass.flat_map(|follower| rest(&mass, &follower.rotation)).collect();
     let mass = if left.is_empty() { mass } else { sum(&mass, &left) };
-    let soft = followers.into_iter().filter(|one| one.is_soft).map(|one| one.rotation).collect();
+    let soft =
+        followers.into_iter().filter(|follower| follower.is_soft).map(|follower| follower.rotation).collect();
     Following { stiffness: held, mass, soft: SoftRotations::new(soft), found }
 }
 
 /// Returns a diagnostic about the soft rotations that follow, or about those without stiffness and mass;
 /// `None` if there are none.
 fn remark(followers: &[Follower], nodes: &Nodes, soft: bool) -> Option<Diagnostic> {
-    let mut ids: Vec<i64> =
-        followers.iter().filter(|one| one.is_soft == soft).map(|one| nodes.ids[one.node]).collect();
+    let mut ids: Vec<i64> = followers
+        .iter()
+        .filter(|follower| follower.is_soft == soft)
+        .map(|follower| nodes.ids[follower.node])
+        .collect();
     ids.dedup();
     let (count, named) = (ids.len(), name_some(&ids));
     let (code, message) = if soft {

@@ -179,8 +179,9 @@ impl RowsOfNodes {
     /// displacement without stiffness and mass is kept if the node has other displacements: it is an error.
     fn leave_out_empty(&mut self, raw: &RawModel) -> LeftOut {
         let others = raw.data.damping.as_ref().and_then(Damping::matrix).into_iter();
-        let others = others.chain(raw.data.geometric_stiffness.iter().map(|one| &one.matrix));
-        let matrices = [&raw.stiffness, &raw.mass].into_iter().chain(others).map(|one| &one.matrix);
+        let others = others.chain(raw.data.geometric_stiffness.iter().map(|stiffness| &stiffness.matrix));
+        let matrices =
+            [&raw.stiffness, &raw.mass].into_iter().chain(others).map(|stiffness| &stiffness.matrix);
         let filled = filled_rows(matrices, raw.stiffness.matrix.n_cols());
         let mut left_out = LeftOut::default();
         if filled.iter().all(|filled| *filled) {

@@ -15,7 +15,7 @@ impl FeModel {
     /// The errors of [`FeModel::proved_elements`]; [`RecoveryRows`](Code::RecoveryRows) for nodes of no element;
     /// [`ManifestSyntax`](Code::ManifestSyntax) for a name that is given twice.
     pub fn add_nodal_stresses(&mut self, asked: &[NodalStress]) -> Result<()> {
-        let mut names = self.recoveries().iter().map(|one| one.name.clone()).collect();
+        let mut names = self.recoveries().iter().map(|recovery| recovery.name.clone()).collect();
         for NodalStress { name, nodes, path } in asked {
             refuse_name(name, &mut names)
                 .map_err(|(code, message)| Diagnostic::new(code, format!("recovery {message}")))?;

@@ -35,9 +35,9 @@ impl From<RawMatrix> for MatrixOrigin {
 
 impl From<RawModel> for Origin {
     fn from(raw: RawModel) -> Self {
-        let of_load = |one: GeometricStiffness<RawMatrix>| GeometricStiffness {
-            load: one.load,
-            matrix: one.matrix.into(),
+        let of_load = |stiffness: GeometricStiffness<RawMatrix>| GeometricStiffness {
+            load: stiffness.load,
+            matrix: stiffness.matrix.into(),
         };
         Self {
             stiffness: raw.stiffness.into(),

@@ -53,9 +53,9 @@ impl SoftRotations {
             let row = |row: u32| kept.binary_search(&(row as usize)).ok().map(|at| at as u32);
             part.iter().map(|&(old, value)| Some((row(old)?, value))).collect()
         };
-        let of_body = |one: &SoftRotation| {
-            let (direction, term) = (moved(&one.direction)?, moved(&one.term)?);
-            Some(SoftRotation { direction, term, stiffness: one.stiffness })
+        let of_body = |rotation: &SoftRotation| {
+            let (direction, term) = (moved(&rotation.direction)?, moved(&rotation.term)?);
+            Some(SoftRotation { direction, term, stiffness: rotation.stiffness })
         };
         Self { all: self.all.iter().filter_map(of_body).collect() }
     }
@@ -107,13 +107,13 @@ struct Released<'r> {
 impl<'r> Released<'r> {
     fn new(soft: &'r SoftRotations, stiffness: &SymmetricMatrix) -> Self {
         let rotations = soft.all.as_slice();
-        let row = |one: &SoftRotation| {
+        let row = |rotation: &SoftRotation| {
             // v'(K - k g g') with g'v = 1; the directions of other rotations are orthogonal to g.
-            let of_stiffness = one.direction.iter().flat_map(|&(row, part)| {
+            let of_stiffness = rotation.direction.iter().flat_map(|&(row, part)| {
                 let (columns, values) = stiffness.row(row as usize);
                 columns.iter().zip(values).map(move |(&column, &value)| (column, part * value))
             });
-            let without = one.term.iter().map(|&(row, part)| (row, -one.stiffness * part));
+            let without = rotation.term.iter().map(|&(row, part)| (row, -rotation.stiffness * part));
             let mut entries: Vec<(u32, f64)> = of_stiffness.chain(without).collect();
             entries.sort_by_key(|entry| entry.0);
             let of_column = |equal: &[(u32, f64)]| (equal[0].0, equal.iter().map(|entry| entry.1).sum());

@@ -52,7 +52,8 @@ pub(crate) fn refuse_turned_internals(
             diagonal[d * vertex..d * (vertex + 1)].iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
         worst / (own * total).sqrt()
     };
-    let (vertex, deviation) = first_largest(vectors.map(|vertex| (vertex, deviation(vertex))), |one| one.1)?;
+    let (vertex, deviation) =
+        first_largest(vectors.map(|vertex| (vertex, deviation(vertex))), |pair| pair.1)?;
     (deviation > MAX_INTERNAL_DEVIATION).then(|| {
         let message = format!(
             "rows of {} have no coordinates, and the mass that they share with rigid motion deviates by {deviation:.0e} from that of displacements which turn with the body, as those of bubbles do: the invariants would be wrong",

@@ -34,8 +34,8 @@ fn told(components: [&str; 6]) -> (usize, Vec<(Code, String)>) {
     let points = StressPoint::among(labels).len();
     let diagnostics = FeModel::from_raw(raw).expect("a sound model").diagnostics;
     let own = [Code::RecoveryPlane, Code::RecoveryNoEquivalent];
-    let found = diagnostics.iter().filter(|one| own.contains(&one.code()));
-    (points, found.map(|one| (one.code(), one.message().to_owned())).collect())
+    let found = diagnostics.iter().filter(|diagnostic| own.contains(&diagnostic.code()));
+    (points, found.map(|diagnostic| (diagnostic.code(), diagnostic.message().to_owned())).collect())
 }
 
 #[test]
@@ -82,7 +82,10 @@ fn stresses_of_shapes_in_another_unit_are_reported() {
         };
         raw.data.recoveries[0].operator = RecoveryOperator::Shapes { shapes, labels };
         let diagnostics = FeModel::from_raw(raw).expect("a sound model").diagnostics;
-        diagnostics.iter().find(|one| one.code() == Code::RecoveryScale).map(|one| one.message().to_owned())
+        diagnostics
+            .iter()
+            .find(|diagnostic| diagnostic.code() == Code::RecoveryScale)
+            .map(|diagnostic| diagnostic.message().to_owned())
     };
     assert_eq!(said(1.0), None);
     for factor in [1e6, 1e-3] {

@@ -103,9 +103,9 @@ fn told(raw: RawModel) -> (Vec<Code>, String) {
         Ok(checked) => checked.diagnostics,
         Err(error) => error.diagnostics().to_vec(),
     };
-    let found: Vec<_> = found.iter().filter(|one| CODES.contains(&one.code())).collect();
+    let found: Vec<_> = found.iter().filter(|diagnostic| CODES.contains(&diagnostic.code())).collect();
     let text = found.iter().map(|one| format!("{one}\n")).collect();
-    (found.iter().map(|one| one.code()).collect(), text)
+    (found.iter().map(|diagnostic| diagnostic.code()).collect(), text)
 }
 
 /// Returns a bent and tapered bar of hexahedra, rotated in space, with its first layer of nodes held or free.
@@ -291,7 +291,7 @@ fn the_softening_of_a_centrifugal_load_is_refused_by_its_name() {
     for is_held in [false, true] {
         let (mesh, body) = solid(is_held);
         let all = loads(&body);
-        let spins = all.iter().filter(|one| one.0 == LoadKind::Spin);
+        let spins = all.iter().filter(|pair| pair.0 == LoadKind::Spin);
         for (kind, component, load) in spins {
             let (k, l) = LoadKind::SPIN[*component];
             let skew = |k: usize| Vector3::ith(k, 1.0).cross_matrix();
@@ -351,7 +351,7 @@ fn the_stiffness_of_another_load_is_refused() {
             }
         }
         let spin = |component: usize| {
-            &all.iter().filter(|one| one.0 == LoadKind::Spin).nth(2 * component).expect("spins").2
+            &all.iter().filter(|pair| pair.0 == LoadKind::Spin).nth(2 * component).expect("spins").2
         };
         for (given, own) in [(0, 1), (1, 2), (3, 4), (5, 0)] {
             let matrix = stress_stiffness(&mesh, &body.response(spin(own)));
@@ -379,7 +379,8 @@ fn rows_that_supports_took_away_are_told() {
 #[test]
 fn a_stress_with_small_errors_is_taken_with_a_warning() {
     let (mesh, body) = solid(false);
-    let (kind, component, load) = loads(&body).into_iter().find(|one| one.0 == LoadKind::Spin).expect("spin");
+    let (kind, component, load) =
+        loads(&body).into_iter().find(|load| load.0 == LoadKind::Spin).expect("spin");
     let u = body.response(&load);
     let own = stress_stiffness(&mesh, &u);
     let other = difference_of_tangents(&mesh, &Material::STEEL, &u) - &own;

@@ -48,7 +48,7 @@ fn said(raw: RawModel) -> Vec<Diagnostic> {
         Err(error) => error.diagnostics().to_vec(),
     };
     let codes = [Code::RecoveryContradicts, Code::RecoveryUncompared, Code::RecoveryScale];
-    all.into_iter().filter(|one| codes.contains(&one.code())).collect()
+    all.into_iter().filter(|diagnostic| codes.contains(&diagnostic.code())).collect()
 }
 
 /// Returns the message if it is the only one and an error.
@@ -144,7 +144,7 @@ fn wrong_stresses_are_refused_with_the_components_that_differ() {
     // The user may mean it.
     let mut raw = mapped(steel(&bracket(ElementKind::Hex8)), &scaled(0..6, 2.5));
     raw.allow_implausible = true;
-    assert!(said(raw).iter().all(|one| one.code() == Code::RecoveryScale));
+    assert!(said(raw).iter().all(|diagnostic| diagnostic.code() == Code::RecoveryScale));
 }
 
 /// A concentrated mass adds no volume, and stresses along other axes agree with the stiffness by their invariants.

@@ -358,8 +358,8 @@ pub fn stiffness_under<'b>(
     let mut matrices: Vec<Vec<&'b Mat<f64>>> = vec![Vec::new(); kind.components().len()];
     let of_inertia = body.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
     let given = body.geometric_stiffness().iter().filter(|_| which == Stiffening::All);
-    for one in of_inertia.chain(given).filter(|one| one.load.kind == *kind) {
-        matrices[one.load.component].push(&one.matrix);
+    for stiffness in of_inertia.chain(given).filter(|stiffness| stiffness.load.kind == *kind) {
+        matrices[stiffness.load.component].push(&stiffness.matrix);
     }
     matrices.iter().any(|known| !known.is_empty()).then_some(move |component: usize, i, j| {
         matrices[component].iter().map(|matrix| 0.5 * (matrix[(i, j)] + matrix[(j, i)])).sum()

@@ -118,8 +118,9 @@ impl Exponential {
         let dimension = system.dimension();
         let zeros = || vec![0.0; dimension];
         let oscillators = system.oscillators().to_vec();
-        let is_plain =
-            |at: &usize| !oscillators.iter().any(|one| [one.coordinate, one.momentum].contains(at));
+        let is_plain = |at: &usize| {
+            !oscillators.iter().any(|oscillator| [oscillator.coordinate, oscillator.momentum].contains(at))
+        };
         Self {
             plain: (0..dimension).filter(is_plain).collect(),
             oscillators,
@@ -215,9 +216,10 @@ impl Exponential {
     fn find_scales(&mut self, system: &dyn System, state: &[f64]) {
         system.scales(state, &mut self.scales);
         system.follower_scales(state, &mut self.scales);
-        for one in &self.oscillators {
-            if one.stiffness > 0.0 {
-                self.scales[one.coordinate] = self.scales[one.momentum] / one.stiffness.sqrt();
+        for oscillator in &self.oscillators {
+            if oscillator.stiffness > 0.0 {
+                self.scales[oscillator.coordinate] =
+                    self.scales[oscillator.momentum] / oscillator.stiffness.sqrt();
             }
         }
     }
@@ -251,8 +253,8 @@ impl Exponential {
         }
         self.length = None;
         self.solvers.clear();
-        for one in &self.oscillators {
-            let Some(solver) = Solver::new(one, &self.tableau, h) else { return false };
+        for oscillator in &self.oscillators {
+            let Some(solver) = Solver::new(oscillator, &self.tableau, h) else { return false };
             self.solvers.push(solver);
         }
         self.length = Some(h);
@@ -321,11 +323,11 @@ impl Exponential {
         system.rates(time, &self.physical, g)?;
         system.enter_oscillators(g);
         let mut power = 0.0;
-        for one in &self.oscillators {
-            let (x, p) = (one.coordinate, one.momentum);
+        for oscillator in &self.oscillators {
+            let (x, p) = (oscillator.coordinate, oscillator.momentum);
             g[x] -= z[p];
-            g[p] += one.stiffness * z[x] + one.damping * z[p];
-            power += z[p] * g[p] + one.stiffness * z[x] * g[x] - one.damping * z[p] * z[p];
+            g[p] += oscillator.stiffness * z[x] + oscillator.damping * z[p];
+            power += z[p] * g[p] + oscillator.stiffness * z[x] * g[x] - oscillator.damping * z[p] * z[p];
         }
         self.power[node] = power;
         Ok(())
@@ -372,10 +374,11 @@ impl Exponential {
         };
         let of_plain = |at: &usize| (0.5 * h * INTEGRAL_OF_TOP * top(*at) / self.scales[*at]).powi(2);
         // An oscillator that is fast beside the polynomial follows it statically.
-        let of_oscillator = |one: &Oscillator| {
-            let rate = one.stiffness.sqrt();
+        let of_oscillator = |oscillator: &Oscillator| {
+            let rate = oscillator.stiffness.sqrt();
             let reach = (0.5 * h * INTEGRAL_OF_TOP).min(1.0 / rate);
-            2.0 * ((top(one.momentum) + rate * top(one.coordinate)) * reach / self.scales[one.momentum])
+            2.0 * ((top(oscillator.momentum) + rate * top(oscillator.coordinate)) * reach
+                / self.scales[oscillator.momentum])
                 .powi(2)
         };
         let sum = self.plain.iter().map(of_plain).sum::<f64>()
@@ -411,8 +414,9 @@ impl Exponential {
 
     /// Returns the energy of the oscillators in a state in their coordinates.
     fn energy(&self, z: &[f64]) -> f64 {
-        let of =
-            |one: &Oscillator| 0.5 * (z[one.momentum].powi(2) + one.stiffness * z[one.coordinate].powi(2));
+        let of = |oscillator: &Oscillator| {
+            0.5 * (z[oscillator.momentum].powi(2) + oscillator.stiffness * z[oscillator.coordinate].powi(2))
+        };
         self.oscillators.iter().map(of).sum()
     }
 
@@ -435,11 +439,11 @@ impl Exponential {
         for &at in &self.plain {
             state[at] += self.powers.iter().zip(&integrals).map(|(power, w)| power[at] * w).sum::<f64>();
         }
-        for one in &self.oscillators {
-            let (x, p) = (one.coordinate, one.momentum);
+        for oscillator in &self.oscillators {
+            let (x, p) = (oscillator.coordinate, oscillator.momentum);
             let powers: Pairs = std::array::from_fn(|n| Vector2::new(self.powers[n][x], self.powers[n][p]));
             let begun = Vector2::new(first[x], first[p]);
-            let z = forced(one, &self.tableau, h, t, &begun, &powers);
+            let z = forced(oscillator, &self.tableau, h, t, &begun, &powers);
             (state[x], state[p]) = (z[0], z[1]);
         }
         if let Some(work) = self.work_entry {
@@ -455,15 +459,15 @@ impl Exponential {
     /// counts as that of its acceleration beside the slowest oscillator.
     pub(super) fn points(&self) -> f64 {
         let Some(h) = self.length else { return 0.0 };
-        let rates = self.oscillators.iter().map(|one| one.stiffness.sqrt());
+        let rates = self.oscillators.iter().map(|oscillator| oscillator.stiffness.sqrt());
         let slowest = rates.filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
-        let points = |one: &Oscillator| {
-            let (x, p, rate) = (one.coordinate, one.momentum, one.stiffness.sqrt());
+        let points = |oscillator: &Oscillator| {
+            let (x, p, rate) = (oscillator.coordinate, oscillator.momentum, oscillator.stiffness.sqrt());
             let mut z = Vector2::new(self.states[0][x], self.states[0][p]);
-            if is_stiff(one, h) {
+            if is_stiff(oscillator, h) {
                 let powers: Pairs =
                     std::array::from_fn(|n| Vector2::new(self.powers[n][x], self.powers[n][p]));
-                z -= value(&particular(one, h, &powers), -1.0);
+                z -= value(&particular(oscillator, h, &powers), -1.0);
             }
             let amplitude = z[1].hypot(rate * z[0]) / self.scales[p] * (rate / slowest);
             h * rate * (amplitude / (128.0 * SEEN)).powf(0.25)

@@ -105,7 +105,7 @@ impl LoadedHistory {
                 let all = UnitLoad::at_interface(&load.interface);
                 all.iter().any(|one| steps.columns.contains(&one.step()))
             };
-            let mut known = body.recoveries().iter().flat_map(|one| &one.loads);
+            let mut known = body.recoveries().iter().flat_map(|recovery| &recovery.loads);
             if is_loaded && !has_step() && !known.any(|own| own.interface == load.interface) {
                 let message =
                     format!("no step has the static response to loads at interface `{}`", load.interface);

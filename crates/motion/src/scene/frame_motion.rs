@@ -121,7 +121,7 @@ impl CaseRun {
                 parts.recoveries.iter_mut().for_each(Recovery::remove_damping);
             }
             Omission::GeometricStiffness(loads) => {
-                parts.geometric_stiffness.retain(|one| !loads.contains(&one.load));
+                parts.geometric_stiffness.retain(|stiffness| !loads.contains(&stiffness.load));
                 parts.rotated_stiffness.retain(|one| !loads.contains(&one.load));
             }
             Omission::DeformedInertia => {
@@ -138,7 +138,7 @@ impl CaseRun {
 
 /// Returns the stiffness of a motion from those of unit motions.
 fn stiffness_of(stiffness: &[GeometricStiffness<Mat<f64>>], motion: &RigidAcceleration) -> Mat<f64> {
-    let n = stiffness.first().map_or(0, |one| one.matrix.nrows());
+    let n = stiffness.first().map_or(0, |stiffness| stiffness.matrix.nrows());
     stiffness.iter().fold(Mat::zeros(n, n), |sum: Mat<f64>, one| {
         let factor = match one.load.kind {
             LoadKind::Acceleration => motion.linear[one.load.component],

@@ -174,7 +174,7 @@ fn joined<'t>(name: &str, common: &Value<'t>, case: &Value<'t>) -> Value<'t> {
 
 /// Returns findings about common keys once, and all others with the name of their case.
 fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
-    let is_common = |one: &Diagnostic| found.iter().all(|own| own.contains(one));
+    let is_common = |diagnostic: &Diagnostic| found.iter().all(|own| own.contains(diagnostic));
     let mut distinct = Vec::new();
     for (at, (own, name)) in found.iter().zip(names).enumerate() {
         for one in own {

@@ -136,7 +136,7 @@ impl LoadedHistory {
             })
         };
         let spin = all_of(SPIN_COLUMNS.map(str::to_owned).to_vec());
-        let has_motion = body.recoveries().iter().any(|one| !one.motion.is_empty());
+        let has_motion = body.recoveries().iter().any(|recovery| !recovery.motion.is_empty());
         let [rate, acceleration] =
             ["qd", "qdd"].map(|prefix| if has_motion { all_of(modal(prefix)) } else { None });
         let turning = SPIN_RATE_COLUMNS.map(str::to_owned).to_vec();
@@ -309,7 +309,8 @@ impl LoadedHistory {
     /// Refuses the run of a carried body for a body in another frame, to which the forces of the deformed body that turns
     /// belong.
     fn refuse_other_frame(&self, body: &FlexBody, chosen: &[&Recovery]) -> Result<()> {
-        let depends = |one: &&Recovery| one.motion.iter().any(|own| own.load != MotionLoad::Damping);
+        let depends =
+            |recovery: &&Recovery| recovery.motion.iter().any(|own| own.load != MotionLoad::Damping);
         if !self.is_of_carried || !body.conditions().is_mean() || !chosen.iter().any(depends) {
             return Ok(());
         }
@@ -349,7 +350,8 @@ impl LoadedHistory {
     /// Returns a warning about the forces of motion that recoveries of `body` have columns of and that are left out, since
     /// the history lacks columns.
     pub fn left_out(&self, body: &FlexBody, names: &[String]) -> Option<Diagnostic> {
-        let read = body.recoveries().iter().filter(|one| names.is_empty() || names.contains(&one.name));
+        let read =
+            body.recoveries().iter().filter(|recovery| names.is_empty() || names.contains(&recovery.name));
         let layout = RowLayout::new(body, read);
         let lacking: Vec<&MotionLoad> =
             layout.motion().iter().filter(|load| !self.missing_for(**load).is_empty()).collect();
@@ -371,8 +373,9 @@ impl LoadedHistory {
 
     /// Refuses recoveries that depend on an angular velocity that the history does not have.
     fn refuse_unknown_spin(&self, recoveries: &[RowMap], layout: &RowLayout) -> Result<()> {
-        let needs =
-            recoveries.iter().find(|one| self.angular_velocity.is_none() && one.depends_on_spin(layout));
+        let needs = recoveries
+            .iter()
+            .find(|recovery| self.angular_velocity.is_none() && recovery.depends_on_spin(layout));
         let Some(recovery) = needs else { return Ok(()) };
         let message = format!(
             "recovery `{}` depends on the angular velocity, whose columns are missing: {}",

@@ -33,7 +33,7 @@ impl TracedRecoveries {
         if limits.is_empty() {
             return Ok(None);
         }
-        let chosen = limits.iter().map(|one| limited(body, one)).collect::<Result<Vec<_>>>()?;
+        let chosen = limits.iter().map(|limit| limited(body, limit)).collect::<Result<Vec<_>>>()?;
         let layout = RowLayout::new(body, chosen.iter().copied());
         let maps = chosen.iter().map(|one| RowMap::new(one, &layout)).collect();
         let sampler = RowSampler::new(layout.clone(), body, scene);
@@ -74,8 +74,8 @@ impl TracedRecoveries {
 /// Returns the recovery of `body` that has a limit.
 fn limited<'b>(body: &'b FlexBody, tolerance: &RecoveryTolerance) -> Result<&'b Recovery> {
     let name = &tolerance.recovery;
-    let Some(found) = body.recoveries().iter().find(|one| one.name == *name) else {
-        let known: Vec<&str> = body.recoveries().iter().map(|one| one.name.as_str()).collect();
+    let Some(found) = body.recoveries().iter().find(|recovery| recovery.name == *name) else {
+        let known: Vec<&str> = body.recoveries().iter().map(|recovery| recovery.name.as_str()).collect();
         let has =
             if known.is_empty() { "it has none".to_owned() } else { format!("it has {}", known.join(", ")) };
         let message =
@@ -173,11 +173,12 @@ impl RecoveryMeasure {
             Some(motion) => motion.recoveries.clone(),
             None => {
                 let layout = RowLayout::new(body, body.recoveries());
-                body.recoveries().iter().map(|one| RowMap::new(one, &layout)).collect()
+                body.recoveries().iter().map(|recovery| RowMap::new(recovery, &layout)).collect()
             }
         };
-        let named =
-            limits.iter().filter_map(|one| Some((one, own.iter().find(|map| map.name == one.recovery)?)));
+        let named = limits
+            .iter()
+            .filter_map(|limit| Some((limit, own.iter().find(|map| map.name == limit.recovery)?)));
         let states = recovered.map(|motion| motion.states.sampled());
         Some(Self::of_maps(body, named, states))
     }
@@ -238,7 +239,7 @@ impl RecoveryMeasure {
 
     /// Returns the names of the recoveries.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.recoveries.iter().map(|one| one.map.name.as_str())
+        self.recoveries.iter().map(|recovery| recovery.map.name.as_str())
     }
 
     /// Returns the errors of `candidate` over time, relative to the limits, at the instants of `reference`. They are
@@ -273,7 +274,12 @@ impl RecoveryMeasure {
         if times.is_empty() || width == 0 {
             return history;
         }
-        let places = self.recoveries.iter().flat_map(|one| &one.groups).map(|group| group.places.len()).sum();
+        let places = self
+            .recoveries
+            .iter()
+            .flat_map(|recovery| &recovery.groups)
+            .map(|group| group.places.len())
+            .sum();
         let directions = Directions::new(states, places);
         for (one, matrix) in self.recoveries.iter().zip(differences) {
             let rows = LinearRows { matrix: matrix.as_ref(), points: &one.map.points };
@@ -345,7 +351,7 @@ impl RecoveryMeasure {
             let error = group.reach * energy;
             if error == 0.0 { 0.0 } else { error / group.allowed(error) }
         };
-        self.recoveries.iter().flat_map(|one| &one.groups).map(of_group).fold(0.0, larger)
+        self.recoveries.iter().flat_map(|recovery| &recovery.groups).map(of_group).fold(0.0, larger)
     }
 
     /// Returns the largest contribution of every mode over its limit.
@@ -354,10 +360,10 @@ impl RecoveryMeasure {
     ///   the spin, which is what a body with static columns lacks without the mode.
     pub fn contributions(&self, whole: &[f64], dynamic: &[f64]) -> Vec<f64> {
         let mut most = vec![0.0; whole.len()];
-        for one in &self.recoveries {
-            let rows = LinearRows::of(&one.map);
-            let amplitudes = if one.static_columns { dynamic } else { whole };
-            for group in &one.groups {
+        for recovery in &self.recoveries {
+            let rows = LinearRows::of(&recovery.map);
+            let amplitudes = if recovery.static_columns { dynamic } else { whole };
+            for group in &recovery.groups {
                 let allowed = group.allowed(0.0);
                 for &place in &group.places {
                     let values = magnitudes(group.magnitude, &rows, place);

@@ -422,7 +422,10 @@ impl EnvelopeSearch {
     pub fn new(recoveries: &[RowMap], between: bool) -> Self {
         Self {
             between,
-            found: recoveries.iter().map(|one| vec![PointEnvelope::new(); one.points.len()]).collect(),
+            found: recoveries
+                .iter()
+                .map(|recovery| vec![PointEnvelope::new(); recovery.points.len()])
+                .collect(),
         }
     }
 

@@ -118,8 +118,8 @@ fn simulate_recording(
 
 /// Returns notes about recoveries of `body` that it does not have in the frame of the scene.
 fn left_out(body: &FlexBody, framed: &FlexBody) -> Vec<Diagnostic> {
-    let kept = |name: &str| framed.recoveries().iter().any(|one| one.name == name);
-    let lost = body.recoveries().iter().filter(|one| !kept(&one.name));
+    let kept = |name: &str| framed.recoveries().iter().any(|recovery| recovery.name == name);
+    let lost = body.recoveries().iter().filter(|recovery| !kept(&recovery.name));
     lost.map(|one| {
         let message =
             format!("recovery `{}` has displacements relative to the frame of the file, and the motion is in mean axes: it is left out", one.name);
@@ -323,9 +323,9 @@ impl Setting {
 /// Returns the loads and motions for which `body` has geometric stiffness, without their axes, each once.
 fn stiffening_loads(body: &FlexBody) -> Vec<String> {
     let mut loads = Vec::new();
-    for one in body.geometric_stiffness() {
-        let kind = one.load.kind.name().replace('_', " ");
-        let words = match &one.load.kind {
+    for stiffness in body.geometric_stiffness() {
+        let kind = stiffness.load.kind.name().replace('_', " ");
+        let words = match &stiffness.load.kind {
             LoadKind::Named(name) => format!("{kind} `{name}`"),
             LoadKind::Force(at) | LoadKind::Moment(at) => format!("{kind} at `{at}`"),
             _ => kind,

@@ -63,7 +63,7 @@ impl StressError {
         let all: Vec<usize> = (0..body.n_modes()).collect();
         let errors = match trace_at(&stressed, &scene, &own.time, &context.without_listener()) {
             Ok(other) => Measure::new(body, &scene, own).of_subset(&other, &all).largest(),
-            Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => {
+            Err(error) if error.diagnostics().iter().all(|diagnostic| ends_a_run(diagnostic.code())) => {
                 OutputErrors::all(Some(f64::INFINITY))
             }
             Err(error) => return Err(error),
@@ -100,7 +100,9 @@ impl StressError {
         context.phase("stress of the spin");
         match trace(body, &scene, context) {
             Ok((own, _)) => Self::of_trace(body, &scene, &own, context),
-            Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(None),
+            Err(error) if error.diagnostics().iter().all(|diagnostic| ends_a_run(diagnostic.code())) => {
+                Ok(None)
+            }
             Err(error) => Err(error),
         }
     }
@@ -154,7 +156,7 @@ fn missing_part(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Option<(
     }
     let uses_given = scene.run.terms.geometric_stiffness;
     let part = |omega: &Vector3<f64>| Some((body.missing_part(omega, uses_given)?, *omega));
-    let (part, omega) = first_largest(extremes.spins.iter().filter_map(part), |one| one.0)?;
+    let (part, omega) = first_largest(extremes.spins.iter().filter_map(part), |pair| pair.0)?;
     // A change of stiffness drifts by half of it times Omega_1 T (theory section 7).
     let first = body.modes().eigenvalue.first()?.sqrt();
     let drift = 0.5 * first * scene.run.duration.unwrap_or(0.0);

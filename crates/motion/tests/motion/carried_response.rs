@@ -37,7 +37,10 @@ fn missing(body: &FlexBody, head: &str, tail: &str) -> Option<String> {
     std::fs::write(&path, text).expect("written");
     let scene = LoadCases::read_single(path, None).expect("a scene");
     let found = FramedScene::new(body, &scene).expect("a carried body").found;
-    found.iter().find(|one| one.code() == Code::CarrierUnresolved).map(|one| one.message().to_owned())
+    found
+        .iter()
+        .find(|diagnostic| diagnostic.code() == Code::CarrierUnresolved)
+        .map(|one| one.message().to_owned())
 }
 
 /// A few bending modes hold the response to gravity across the beam and nothing of that along it, to spin about any axis

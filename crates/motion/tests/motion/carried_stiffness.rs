@@ -190,7 +190,11 @@ fn the_reaction_is_one_of_the_loads_that_stress_a_carried_body() {
     let bar = Bar::new();
     for frame in frames() {
         let body = body_of(bar.stressed(), frame.clone()).carried(&root()).expect("a carrier");
-        assert!(body.geometric_stiffness().iter().all(|one| one.load.kind.interface() != Some("root")));
+        assert!(
+            body.geometric_stiffness()
+                .iter()
+                .all(|stiffness| stiffness.load.kind.interface() != Some("root"))
+        );
         let (psi, mut random) = (shapes(&body), Random(5));
         for _ in 0..3 {
             let [a, alpha, w, force, moment] = std::array::from_fn(|_| Vector3::from(random.vector::<3>()));
@@ -312,7 +316,8 @@ fn only_a_body_without_the_stiffness_of_rotations_loses_geometric_stiffness() {
         let body = FlexBody::new(parts).expect("a body");
         let scene = carried_scene();
         let framed = FramedScene::new(&body, &scene).expect("a carrier");
-        let warned = framed.found.iter().any(|one| one.code() == Code::CarriedGeometricStiffness);
+        let warned =
+            framed.found.iter().any(|diagnostic| diagnostic.code() == Code::CarriedGeometricStiffness);
         assert_eq!((warned, framed.body.geometric_stiffness().is_empty()), (is_lost, is_lost));
     }
 }

@@ -154,8 +154,8 @@ fn gravity_keeps_the_energy() {
             let q = y.rows(7, nf);
             let of_inertia = body.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
             let mut s = own.first_moment + Vector3::from_column_slice((&own.c1 * q).as_slice());
-            for one in of_inertia.filter(|one| one.load.kind == LoadKind::Acceleration) {
-                s[one.load.component] += 0.5 * q.dot(&(dense(&one.matrix) * q));
+            for stiffness in of_inertia.filter(|stiffness| stiffness.load.kind == LoadKind::Acceleration) {
+                s[stiffness.load.component] += 0.5 * q.dot(&(dense(&stiffness.matrix) * q));
             }
             -gravity.dot(&(own.mass * y.fixed_rows::<3>(0) + orientation(y).axes() * s))
         };

@@ -16,10 +16,10 @@ const MOTION: [LoadKind; 3] = [LoadKind::Spin, LoadKind::Acceleration, LoadKind:
 /// Returns the sum of the matrices of a kind times `amounts`, in the order of its components, times q.
 fn product(body: &FlexBody, kind: &LoadKind, amounts: &[f64], q: &[f64]) -> DVector<f64> {
     let mut sum = DVector::zeros(q.len());
-    for one in body.geometric_stiffness().iter().filter(|one| one.load.kind == *kind) {
+    for stiffness in body.geometric_stiffness().iter().filter(|stiffness| stiffness.load.kind == *kind) {
         for i in 0..q.len() {
-            let row: f64 = (0..q.len()).map(|j| one.matrix[(i, j)] * q[j]).sum();
-            sum[i] += amounts[one.load.component] * row;
+            let row: f64 = (0..q.len()).map(|j| stiffness.matrix[(i, j)] * q[j]).sum();
+            sum[i] += amounts[stiffness.load.component] * row;
         }
     }
     sum

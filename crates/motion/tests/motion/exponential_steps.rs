@@ -25,8 +25,8 @@ impl<L: Fn(f64) -> f64> Loaded<L> {
         let oscillator =
             |(j, &(stiffness, damping))| Oscillator { coordinate: j, momentum: n + j, stiffness, damping };
         Self {
-            stiffness: of.iter().map(|one| one.0).collect(),
-            damping: of.iter().map(|one| one.1).collect(),
+            stiffness: of.iter().map(|pair| pair.0).collect(),
+            damping: of.iter().map(|pair| pair.1).collect(),
             load,
             coupling,
             oscillators: of.iter().enumerate().map(oscillator).collect(),

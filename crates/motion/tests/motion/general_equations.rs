@@ -298,10 +298,10 @@ fn assert_stiffness_of_inertia(name: &str, body: &FlexBody, reference: &Value) {
     ] {
         let all = matrix(&reference[what]);
         let modes = all.ncols();
-        for one in own.stiffness.iter().filter(|one| one.load.kind == kind) {
-            let expected = all.view((one.load.component * modes, 0), (nf, nf));
-            let error = (dense(&one.matrix).abs() - expected.abs()).amax() / all.amax();
-            assert!(error < 1e-9, "{name} {}: {error:e}", one.load.label());
+        for stiffness in own.stiffness.iter().filter(|stiffness| stiffness.load.kind == kind) {
+            let expected = all.view((stiffness.load.component * modes, 0), (nf, nf));
+            let error = (dense(&stiffness.matrix).abs() - expected.abs()).amax() / all.amax();
+            assert!(error < 1e-9, "{name} {}: {error:e}", stiffness.load.label());
         }
     }
 }

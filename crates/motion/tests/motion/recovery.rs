@@ -181,8 +181,9 @@ fn a_carried_body_has_envelopes_and_a_free_one_no_displacements_of_another_frame
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, scene).expect("written");
     let scene = LoadCases::read_single(&path, None).expect("a scene");
-    let names_it =
-        |one: &Diagnostic| one.code() == Code::RecoveryLeftOut && one.message().contains("`place`");
+    let names_it = |diagnostic: &Diagnostic| {
+        diagnostic.code() == Code::RecoveryLeftOut && diagnostic.message().contains("`place`")
+    };
     let at_root = body.carried(&Carrier::Interface("root".to_owned())).expect("a body at its root");
     let free = folder.path().join("free.toml");
     std::fs::write(&free, "[run]\nduration = 0.01\n").expect("written");

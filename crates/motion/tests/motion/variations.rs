@@ -85,7 +85,7 @@ fn standard_variations_stay_near_the_scene() {
     assert_eq!(cases.variations(2).len(), 3);
     // A robust scene has the same variations, as a requirement.
     let robust = read(&format!("robust = true\n{SCENE}")).expect("a scene");
-    let of_robust: Vec<String> = robust.variations(3).into_iter().map(|one| one.name).collect();
+    let of_robust: Vec<String> = robust.variations(3).into_iter().map(|variation| variation.name).collect();
     assert!(robust.requires_variations() && of_robust == names);
     // A scene that was not read from a file has none.
     assert!(LoadCases::from(cases[0].clone()).variations(3).is_empty());
@@ -103,7 +103,7 @@ fn variations_belong_to_their_load_cases() {
     );
     let cases = read(&text).unwrap_or_else(|error| panic!("{error}"));
     let told: Vec<(String, usize)> =
-        cases.variations(3).into_iter().map(|one| (one.name, one.case)).collect();
+        cases.variations(3).into_iter().map(|variation| (variation.name, variation.case)).collect();
     assert_eq!(told, [("faster".to_owned(), 0), ("faster".to_owned(), 1), ("only b".to_owned(), 1)]);
     let rate = cases.variations(3)[1].scene.spin.as_ref().expect("a spin").velocity.at(0.0).0;
     assert_eq!(rate, Vector3::new(10.0, 0.0, 0.0));

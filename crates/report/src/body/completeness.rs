@@ -234,7 +234,7 @@ pub(super) fn cut(digits: f64) -> String {
 
 /// Returns the smallest number of digits and its name.
 fn least<T>(digits: impl Iterator<Item = (f64, T)>) -> (String, T) {
-    let (digits, whose) = first_smallest(digits, |one| one.0).expect("bodies have modes and invariants");
+    let (digits, whose) = first_smallest(digits, |pair| pair.0).expect("bodies have modes and invariants");
     (cut(digits), whose)
 }
 

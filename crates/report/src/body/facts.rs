@@ -200,15 +200,18 @@ impl RecoveryFacts {
         Self {
             name: recovery.name.clone(),
             rows: recovery.rows.len(),
-            quantities: quantities.filter(|one| one.rows > 0).collect(),
+            quantities: quantities.filter(|quantity| quantity.rows > 0).collect(),
             loads: recovery.loads.iter().map(|load| load.interface.clone()).collect(),
         }
     }
 
     /// Returns `gauges: 12 x stress, 3 x force`.
     pub(crate) fn in_words(&self) -> String {
-        let quantities: Vec<String> =
-            self.quantities.iter().map(|one| format!("{} x {}", one.rows, one.quantity)).collect();
+        let quantities: Vec<String> = self
+            .quantities
+            .iter()
+            .map(|quantity| format!("{} x {}", quantity.rows, quantity.quantity))
+            .collect();
         format!("{}: {}", self.name, quantities.join(", "))
     }
 }

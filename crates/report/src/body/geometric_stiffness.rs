@@ -82,7 +82,7 @@ pub(super) fn stress_stiffness_in_words(body: &FlexBody) -> Option<String> {
     let loads: Vec<&str> =
         settings["stress_stiffness"].as_array()?.iter().filter_map(serde_json::Value::as_str).collect();
     let elements = settings["elements"].as_array()?;
-    let count: u64 = elements.iter().filter_map(|one| one["count"].as_u64()).sum();
+    let count: u64 = elements.iter().filter_map(|element| element["count"].as_u64()).sum();
     let kind = |one: &serde_json::Value| {
         Some(format!("{} ({})", one["type"].as_str()?, one["formulation"].as_str()?))
     };
@@ -95,7 +95,7 @@ pub(super) fn stress_stiffness_in_words(body: &FlexBody) -> Option<String> {
 /// without W2. An axis has no value if no mode moves perpendicular to it, or if a plane body does not spin
 /// about it.
 pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
-    let given = body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    let given = body.geometric_stiffness().iter().any(|stiffness| stiffness.load.kind == LoadKind::Spin);
     (!given && body.groups().w2).then(|| {
         [0, 1, 2].map(|axis| {
             let spins = body.dimension() == 3 || axis == 2;

@@ -74,9 +74,9 @@ impl<'b> Comparable<'b> {
     /// Removes the recoveries that rigid motion changes: their rows are known relative to the frame of their file only.
     fn remove_recoveries_of_rigid_motion(&mut self) -> Result<()> {
         for body in [&mut self.a, &mut self.b] {
-            let of_frame = |one: &&Recovery| !one.ignores_rigid_motion();
+            let of_frame = |recovery: &&Recovery| !recovery.ignores_rigid_motion();
             let names: Vec<String> =
-                body.recoveries().iter().filter(of_frame).map(|one| one.name.clone()).collect();
+                body.recoveries().iter().filter(of_frame).map(|recovery| recovery.name.clone()).collect();
             if names.is_empty() {
                 continue;
             }

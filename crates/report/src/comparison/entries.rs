@@ -328,15 +328,15 @@ impl Matrices<'_> {
         let mut loads: Vec<&UnitLoad> = a.iter().map(|one| &one.load).collect();
         loads.extend(b.iter().map(|one| &one.load).filter(|load| a.iter().all(|one| one.load != **load)));
         let of = |all: &OfLoads, load: &UnitLoad| {
-            all.iter().find(|one| one.load == *load).map(|one| one.matrix.clone())
+            all.iter().find(|one| one.load == *load).map(|stiffness| stiffness.matrix.clone())
         };
         // Largest entry of each kind of load, the scale of its differences.
         let mut found = LoadDifference { difference: 0.0, sizes: Vec::new(), missing: Vec::new() };
-        for one in a.iter().chain(b) {
-            let size = largest_entry(one.matrix.as_ref());
-            match found.sizes.iter_mut().find(|(kind, _)| *kind == one.load.kind) {
+        for stiffness in a.iter().chain(b) {
+            let size = largest_entry(stiffness.matrix.as_ref());
+            match found.sizes.iter_mut().find(|(kind, _)| *kind == stiffness.load.kind) {
                 Some((_, known)) => *known = larger(*known, size),
-                None => found.sizes.push((one.load.kind.clone(), size)),
+                None => found.sizes.push((stiffness.load.kind.clone(), size)),
             }
         }
         // Differences load by load; a missing matrix counts as zero.
@@ -375,8 +375,10 @@ impl LoadDifference {
         let of_acceleration = self.size(&LoadKind::Acceleration) * d;
         let kinds = [LoadKind::AngularAcceleration, LoadKind::Spin];
         let lost = kinds.iter().map(|kind| {
-            let of_kind = before.iter().filter(|one| one.load.kind == *kind);
-            let moved = of_kind.map(|one| largest_entry(one.matrix.as_ref())).fold(of_acceleration, larger);
+            let of_kind = before.iter().filter(|stiffness| stiffness.load.kind == *kind);
+            let moved = of_kind
+                .map(|stiffness| largest_entry(stiffness.matrix.as_ref()))
+                .fold(of_acceleration, larger);
             let size = self.size(kind);
             if size == 0.0 { 0.0 } else { 32.0 * f64::EPSILON * moved / size }
         });

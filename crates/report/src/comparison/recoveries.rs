@@ -157,7 +157,7 @@ fn difference_in_motion(
 impl Pair<'_> {
     /// Returns the second body along the axes of the first. Its rows of forces of motion are then comparable.
     fn second_along_axes_of_first(&self) -> Result<Cow<'_, FlexBody>> {
-        let has_motion = self.b.recoveries().iter().any(|one| !one.motion.is_empty());
+        let has_motion = self.b.recoveries().iter().any(|recovery| !recovery.motion.is_empty());
         if !has_motion || (self.a.frame().axes - self.b.frame().axes).norm() <= SAME_AXES {
             return Ok(Cow::Borrowed(self.b));
         }
@@ -172,10 +172,10 @@ impl Pair<'_> {
         other: &Recovery,
         units: &mut BTreeSet<String>,
     ) -> Option<Conversion> {
-        let loads = |one: &Recovery| -> BTreeSet<String> {
-            one.loads.iter().map(|load| load.interface.clone()).collect()
+        let loads = |recovery: &Recovery| -> BTreeSet<String> {
+            recovery.loads.iter().map(|load| load.interface.clone()).collect()
         };
-        let kinds = |one: &Recovery| one.motion.iter().map(|own| own.load).collect::<Vec<_>>();
+        let kinds = |recovery: &Recovery| recovery.motion.iter().map(|own| own.load).collect::<Vec<_>>();
         if loads(own) != loads(other) || kinds(own) != kinds(other) || own.rows.len() != other.rows.len() {
             return None;
         }
@@ -225,8 +225,9 @@ impl Conversion {
         let Self { factors, order } = self;
         let times = |a: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| factors[i] * a[(i, j)]);
         let named = |i: usize, c: usize| factors[i] * other.named[(i, order[c])];
-        let load = |one: &LoadColumns| LoadColumns { columns: times(&one.columns), ..one.clone() };
-        let motion = |one: &MotionColumns| MotionColumns { columns: times(&one.columns), ..*one };
+        let load =
+            |columns: &LoadColumns| LoadColumns { columns: times(&columns.columns), ..columns.clone() };
+        let motion = |columns: &MotionColumns| MotionColumns { columns: times(&columns.columns), ..*columns };
         Recovery {
             offset: other.offset.iter().zip(factors).map(|(value, factor)| factor * value).collect(),
             modes: times(&other.modes),

@@ -48,7 +48,7 @@ impl EnvelopeKind {
     /// of its points is a node.
     pub fn bytes(self, body: &FlexBody, envelope: &Envelope) -> Result<Vec<u8>> {
         let none = |what: &str| Diagnostic::new(Code::RecoveryUnknown, what.to_owned());
-        if envelope.recoveries.iter().all(|one| one.points.is_empty()) {
+        if envelope.recoveries.iter().all(|recovery| recovery.points.is_empty()) {
             let help =
                 "give the rows of six stresses of a point one name that ends with xx, yy, zz, xy, yz, xz";
             return Err(none("no recovery has all six stresses of a point").with_help(help).into());

@@ -60,7 +60,11 @@ impl RandomFacts {
             inputs: random.inputs.iter().map(|(name, rms)| plain((name, *rms))).collect(),
             band_hz: random.band,
             evaluations: random.evaluations,
-            displacements: random.displacements.iter().map(|one| plain((&one.name, one.rms))).collect(),
+            displacements: random
+                .displacements
+                .iter()
+                .map(|displacement| plain((&displacement.name, displacement.rms)))
+                .collect(),
             recoveries: random.recoveries.iter().map(RecoveryFacts::new).collect(),
         }
     }
@@ -91,14 +95,15 @@ impl RandomFacts {
     fn table(&self) -> Table {
         let heads = ["Recovery", "Largest", "RMS", "3 sigma", "Unit", "Error"];
         let mut rows: Vec<Vec<Inline>> = Vec::new();
-        for one in &self.recoveries {
-            let point = one.largest_von_mises.iter();
-            let point = point.map(|own| (own, "von Mises", one.errors.and_then(|errors| errors.von_mises)));
-            let of_units = one.largest_row.iter().chain(&one.other_largest_rows);
-            let of_units = of_units.map(|own| (own, "row", one.errors.map(|errors| errors.rows)));
+        for recovery in &self.recoveries {
+            let point = recovery.largest_von_mises.iter();
+            let point =
+                point.map(|own| (own, "von Mises", recovery.errors.and_then(|errors| errors.von_mises)));
+            let of_units = recovery.largest_row.iter().chain(&recovery.other_largest_rows);
+            let of_units = of_units.map(|own| (own, "row", recovery.errors.map(|errors| errors.rows)));
             for (value, kind, error) in point.chain(of_units) {
                 rows.push(vec![
-                    one.name.clone().into(),
+                    recovery.name.clone().into(),
                     format!("{kind} {}", value.name).into(),
                     significant(value.rms, 4).into(),
                     significant(3.0 * value.rms, 4).into(),
@@ -151,10 +156,14 @@ impl EnvelopeKind {
         match self {
             Self::Csv => Ok(random_csv(random).into_bytes()),
             Self::Vtu => {
-                let values = |one: &RandomRecovery| PointValues {
-                    name: format!("{} von Mises RMS", one.name),
-                    nodes: one.points.iter().map(|point| one.rows[point.first_row()].node).collect(),
-                    values: one.von_mises.clone(),
+                let values = |recovery: &RandomRecovery| PointValues {
+                    name: format!("{} von Mises RMS", recovery.name),
+                    nodes: recovery
+                        .points
+                        .iter()
+                        .map(|point| recovery.rows[point.first_row()].node)
+                        .collect(),
+                    values: recovery.von_mises.clone(),
                     is_smallest: false,
                     cases: Vec::new(),
                 };
@@ -189,16 +198,16 @@ fn random_csv(random: &RandomResponse) -> String {
         ];
         csv::push_row(&mut table, cells);
     };
-    for one in &random.displacements {
-        push("", "displacement", &one.name, None, one.rms);
+    for displacement in &random.displacements {
+        push("", "displacement", &displacement.name, None, displacement.rms);
     }
-    for one in &random.recoveries {
-        for (row, rms) in one.rows.iter().zip(&one.rms) {
-            push(&one.name, "row", &row.name, Some(row), *rms);
+    for recovery in &random.recoveries {
+        for (row, rms) in recovery.rows.iter().zip(&recovery.rms) {
+            push(&recovery.name, "row", &row.name, Some(row), *rms);
         }
-        let of_point = |point: &StressPoint| &one.rows[point.first_row()];
-        for (point, rms) in one.points.iter().zip(&one.von_mises) {
-            push(&one.name, "von Mises", &point.name, Some(of_point(point)), *rms);
+        let of_point = |point: &StressPoint| &recovery.rows[point.first_row()];
+        for (point, rms) in recovery.points.iter().zip(&recovery.von_mises) {
+            push(&recovery.name, "von Mises", &point.name, Some(of_point(point)), *rms);
         }
     }
     table

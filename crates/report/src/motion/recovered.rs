@@ -192,7 +192,7 @@ impl<'a> RecoveredFacts<'a> {
             let words = format!("{}: the table has no columns of their loads", names(&self.unloaded));
             terms.push(Term::new("Unloaded", words));
         }
-        terms.extend(self.recoveries.iter().flat_map(|one| one.terms(&self.time_unit)));
+        terms.extend(self.recoveries.iter().flat_map(|recovery| recovery.terms(&self.time_unit)));
         let blocks = vec![Block::Terms(terms), Block::Diagnostics(self.diagnostics)];
         Document { name: self.body, kind: "Recovery", generator: &self.generator, blocks }
     }
@@ -204,11 +204,11 @@ impl<'a> RecoveredFacts<'a> {
 pub fn recovered_csv(motion: &RecoveredMotion) -> String {
     const MEASURES: [&str; 5] =
         ["von Mises", "signed von Mises", "principal 1", "principal 2", "principal 3"];
-    let name = |one: &RowMap| -> Vec<String> {
-        let rows = one.rows.iter().map(|row| row.name.clone());
+    let name = |map: &RowMap| -> Vec<String> {
+        let rows = map.rows.iter().map(|row| row.name.clone());
         let measures = |point: &StressPoint| MEASURES.map(|measure| format!("{} {measure}", point.name));
-        let points = one.points.iter().flat_map(measures);
-        rows.chain(points).map(|own| csv::text(&format!("{} {own}", one.name))).collect()
+        let points = map.points.iter().flat_map(measures);
+        rows.chain(points).map(|own| csv::text(&format!("{} {own}", map.name))).collect()
     };
     let mut table = String::new();
     csv::push_row(
@@ -216,13 +216,13 @@ pub fn recovered_csv(motion: &RecoveredMotion) -> String {
         std::iter::once("time".to_owned()).chain(motion.recoveries.iter().flat_map(name)),
     );
     for (time, z) in motion.states.times.iter().zip(motion.states.iter()) {
-        let values = |one: &RowMap| {
-            let rows = one.values(z);
+        let values = |map: &RowMap| {
+            let rows = map.values(z);
             let measures = |point: &StressPoint| {
                 let [a, b, c] = point.principal(&rows);
                 [point.von_mises(&rows), point.signed_von_mises(&rows), a, b, c]
             };
-            let measures: Vec<f64> = one.points.iter().flat_map(measures).collect();
+            let measures: Vec<f64> = map.points.iter().flat_map(measures).collect();
             rows.into_iter().chain(measures)
         };
         let values = motion.recoveries.iter().flat_map(values);

@@ -395,7 +395,7 @@ impl<'a> SimulationFacts<'a> {
             Term::new("Point", format!("{name}: {words}"))
         }));
         let time = self.units.time();
-        terms.extend(self.recoveries.iter().flat_map(|one| one.terms(&time)));
+        terms.extend(self.recoveries.iter().flat_map(|recovery| recovery.terms(&time)));
         terms
     }
 

@@ -244,16 +244,16 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
     if count == 0 {
         return None;
     }
-    if variations.iter().all(|one| !one.required) {
+    if variations.iter().all(|variation| !variation.required) {
         let all: Vec<String> = variations.iter().map(VariationFacts::if_it_happens).collect();
         return Some(format!("if the motion differs: {}", all.join("; ")));
     }
     let kind = if variations[0].stated { "stated" } else { "standard" };
     let of = |which: &dyn Fn(&&VariationFacts<'_>) -> bool| -> Vec<&VariationFacts<'_>> {
-        variations.iter().filter(|one| which(one)).collect()
+        variations.iter().filter(|variation| which(variation)).collect()
     };
-    let failing = of(&|one| !one.holds && one.is_judged());
-    let unjudged = of(&|one| !one.is_judged());
+    let failing = of(&|variation| !variation.holds && variation.is_judged());
+    let unjudged = of(&|variation| !variation.is_judged());
     let size = |one: &VariationFacts<'_>| {
         let part =
             one.worst.map_or("stops".to_owned(), |worst| format!("{} %", significant(100.0 * worst, 2)));
@@ -261,7 +261,11 @@ pub(super) fn in_words(variations: &[VariationFacts<'_>]) -> Option<String> {
     };
     let list = |some: &[&VariationFacts<'_>]| some.iter().map(|one| size(one)).collect::<Vec<_>>().join(", ");
     let mut words = format!("{} of the scene ({kind})", counted(count, "variation"));
-    let worst = variations.iter().filter(|one| one.holds).filter_map(|one| one.worst).fold(0.0, f64::max);
+    let worst = variations
+        .iter()
+        .filter(|variation| variation.holds)
+        .filter_map(|variation| variation.worst)
+        .fold(0.0, f64::max);
     if failing.is_empty() && unjudged.is_empty() {
         let worst = significant(100.0 * worst, 2);
         words.push_str(&format!(": within the tolerances, largest error {worst} % of its tolerance"));

@@ -199,14 +199,14 @@ impl<'a> SelectionFacts<'a> {
             stress: share.stress,
             recovery: share.recovery,
         });
-        let significance = selection.significances.iter().map(|one| SignificanceFacts {
-            term: one.term,
-            beside: one.beside,
-            group: one.group.name(),
-            guideline: one.guideline,
-            formula: one.formula,
-            tier_0: one.bound,
-            tier_1: one.of_body,
+        let significance = selection.significances.iter().map(|significance| SignificanceFacts {
+            term: significance.term,
+            beside: significance.beside,
+            group: significance.group.name(),
+            guideline: significance.guideline,
+            formula: significance.formula,
+            tier_0: significance.bound,
+            tier_1: significance.of_body,
         });
         Self {
             generator: generator(),

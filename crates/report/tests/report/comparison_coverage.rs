@@ -429,8 +429,8 @@ fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invari
         p.modes.rotation.iter_mut().for_each(columns);
         p.modes.internal.iter_mut().for_each(|rows| columns(&mut rows.shape));
         p.modes.modal_damping.iter_mut().for_each(square);
-        p.geometric_stiffness.iter_mut().for_each(|one| square(&mut one.matrix));
-        inertia(p).stiffness.iter_mut().for_each(|one| square(&mut one.matrix));
+        p.geometric_stiffness.iter_mut().for_each(|stiffness| square(&mut stiffness.matrix));
+        inertia(p).stiffness.iter_mut().for_each(|stiffness| square(&mut stiffness.matrix));
         for load in &mut p.named_loads {
             load.modal.iter_mut().enumerate().for_each(|(j, value)| *value *= sign(j));
             columns(&mut load.turning);

@@ -93,7 +93,7 @@ fn in_unit(recovery: &mut Recovery, from: &str, to: &str, factor: f64) {
         recovery.rows[i].unit = to.to_owned();
         recovery.offset[i] *= factor;
         let arrays = [&mut recovery.modes, &mut recovery.spin, &mut recovery.named];
-        let loads = recovery.loads.iter_mut().map(|one| &mut one.columns);
+        let loads = recovery.loads.iter_mut().map(|load| &mut load.columns);
         let motion = recovery.motion.iter_mut().map(|one| &mut one.columns);
         for array in arrays.into_iter().chain(loads).chain(motion) {
             (0..array.ncols()).for_each(|c| array[(i, c)] *= factor);
@@ -110,9 +110,9 @@ fn flipped(body: &FlexBody) -> FlexBody {
         let columns = |a: &mut Mat<f64>| *a = Mat::from_fn(a.nrows(), a.ncols(), |i, j| sign(j) * a[(i, j)]);
         columns(&mut parts.modes.shape);
         parts.invariants = parts.invariants.with_basis(t.as_ref());
-        for one in &mut parts.recoveries {
-            columns(&mut one.modes);
-            one.motion.iter_mut().for_each(|own| columns(&mut own.columns));
+        for recovery in &mut parts.recoveries {
+            columns(&mut recovery.modes);
+            recovery.motion.iter_mut().for_each(|own| columns(&mut own.columns));
         }
         for load in &mut parts.named_loads {
             load.modal.iter_mut().enumerate().for_each(|(j, value)| *value *= sign(j));

@@ -129,7 +129,9 @@ pub fn enrich_from<B>(
 /// Returns the result, or `otherwise` if a simulation stopped.
 fn unless_stopped<T>(found: Result<T>, otherwise: T) -> Result<T> {
     match found {
-        Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(otherwise),
+        Err(error) if error.diagnostics().iter().all(|diagnostic| ends_a_run(diagnostic.code())) => {
+            Ok(otherwise)
+        }
         found => found,
     }
 }
@@ -146,7 +148,7 @@ pub fn varied_errors(
     context: &Context<'_>,
 ) -> Result<Vec<Vec<ReferenceError>>> {
     let variations = cases.variations(model.dimension());
-    if variations.iter().any(|one| one.scene.run.duration.is_none()) {
+    if variations.iter().any(|variation| variation.scene.run.duration.is_none()) {
         return Ok(Vec::new());
     }
     let error = |one: &SceneVariation| {

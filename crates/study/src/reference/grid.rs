@@ -203,7 +203,7 @@ mod tests {
         let parts = parted(whole, &window, MOST_HALVINGS);
         assert_eq!((parts[0].start, parts[parts.len() - 1].end), (0.0, 1.0));
         assert!(parts.windows(2).all(|pair| pair[0].end == pair[1].start));
-        let fast = parts.iter().filter(|one| one.frequency > 100.0);
+        let fast = parts.iter().filter(|part| part.frequency > 100.0);
         let length: f64 = fast.map(|one| one.end - one.start).sum();
         assert!((0.004..0.02).contains(&length), "{length}");
         let grid = Grid::of_windows(parts, 1000, 1.0).expect("a grid");

@@ -184,7 +184,7 @@ impl<'a> TruncatedMotion<'a> {
         let measure = RecoveryMeasure::new(body, scene, motion.recovered.as_ref())?;
         let model = self.view.model;
         let rows = |name: &str| {
-            let asked = model.recoveries().iter().find(|one| one.name == name)?;
+            let asked = model.recoveries().iter().find(|recovery| recovery.name == name)?;
             recovered_rows(model, asked, &self.columns)
         };
         let truncated = measure.names().map(rows).collect::<Option<Vec<_>>>()?;

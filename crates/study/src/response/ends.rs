@@ -122,11 +122,11 @@ pub(super) fn chosen_rows<'b>(body: &'b FlexBody, stated: &[String]) -> Result<V
             None => chosen.push(ChosenRows { recovery, rows }),
         }
     }
-    for one in &mut chosen {
-        one.rows.sort_unstable();
-        one.rows.dedup();
+    for recovery in &mut chosen {
+        recovery.rows.sort_unstable();
+        recovery.rows.dedup();
     }
-    let count: usize = chosen.iter().map(|one| one.rows.len()).sum();
+    let count: usize = chosen.iter().map(|recovery| recovery.rows.len()).sum();
     if count > MOST_ROWS {
         let message =
             format!("{count} rows of recoveries are asked for, at most {MOST_ROWS} have transfer functions");
@@ -137,7 +137,7 @@ pub(super) fn chosen_rows<'b>(body: &'b FlexBody, stated: &[String]) -> Result<V
 }
 
 fn found_rows<'b>(body: &'b FlexBody, text: &str) -> Result<(&'b Recovery, Vec<usize>)> {
-    let named = |name: &str| body.recoveries().iter().find(|one| one.name == name);
+    let named = |name: &str| body.recoveries().iter().find(|recovery| recovery.name == name);
     if let Some(recovery) = named(text) {
         return Ok((recovery, (0..recovery.rows.len()).collect()));
     }
@@ -151,7 +151,7 @@ fn found_rows<'b>(body: &'b FlexBody, text: &str) -> Result<(&'b Recovery, Vec<u
     };
     let of_recovery = text.split_once(':').and_then(|(name, row)| Some((named(name)?, row)));
     let Some((recovery, row)) = of_recovery else {
-        let known = body.recoveries().iter().map(|one| one.name.as_str()).collect();
+        let known = body.recoveries().iter().map(|recovery| recovery.name.as_str()).collect();
         return Err(unknown(format!("the body has no recovery `{text}`"), known));
     };
     let rows: Vec<usize> = (0..recovery.rows.len()).filter(|&at| recovery.rows[at].name == row).collect();
@@ -200,7 +200,7 @@ impl ChosenRows<'_> {
     /// [`PlaceUnknown`](Code::PlaceUnknown) for a recovery that is known for some shapes only.
     pub(super) fn loads(&self, model: &FeModel) -> Result<Mat<f64>> {
         let name = &self.recovery.name;
-        let asked = model.recoveries().iter().find(|one| one.name == *name);
+        let asked = model.recoveries().iter().find(|recovery| recovery.name == *name);
         asked.and_then(|asked| recovery_loads(model, asked, &self.rows)).ok_or_else(|| {
             let message =
                 format!("the rows of recovery `{name}` are not known for the displacements of all nodes");

@@ -108,7 +108,7 @@ impl<'b> Read<'b> {
     /// Returns, for every output, true if it moves with the body: false for rows of recoveries.
     pub(super) fn moving(&self, dimension: usize) -> Vec<bool> {
         let places = self.to.iter().map(|place| place.directions_of(dimension).len()).sum();
-        let rows = self.rows.iter().map(|one| one.rows.len()).sum();
+        let rows = self.rows.iter().map(|row| row.rows.len()).sum();
         [vec![true; places], vec![false; rows]].concat()
     }
 }
@@ -157,8 +157,8 @@ pub(super) fn reduced_sum(
     });
     let mut direct = Mat::zeros(count, forces.ncols());
     let mut first = motions.ncols();
-    for one in &read.rows {
-        let own = one.direct(&read.from, body);
+    for row in &read.rows {
+        let own = row.direct(&read.from, body);
         direct.as_mut().subrows_mut(first, own.nrows()).copy_from(&own);
         first += own.nrows();
     }
@@ -183,7 +183,7 @@ pub(super) fn reduced_sum(
 ///
 /// * `before`: number of outputs before the rows.
 fn of_rates(rows: &[ChosenRows<'_>], nf: usize, before: usize) -> Option<[Mat<f64>; 2]> {
-    let own: Vec<_> = rows.iter().map(|one| (one.rows.len(), one.of_rates())).collect();
+    let own: Vec<_> = rows.iter().map(|row| (row.rows.len(), row.of_rates())).collect();
     own.iter().any(|(_, rates)| rates.is_some()).then(|| {
         std::array::from_fn(|order| {
             let none = |count: usize| Mat::zeros(nf, count);

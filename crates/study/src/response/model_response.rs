@@ -106,7 +106,7 @@ fn nodal_modes<'m>(
         let loads = places.iter().map(|place| place.loads(model)).collect::<Result<Vec<_>>>()?;
         Ok(side_by_side(&loads.iter().map(|load| load.as_ref()).collect::<Vec<_>>()))
     };
-    let of_recoveries = read.rows.iter().map(|one| one.loads(model)).collect::<Result<Vec<_>>>()?;
+    let of_recoveries = read.rows.iter().map(|row| row.loads(model)).collect::<Result<Vec<_>>>()?;
     let places = unit_loads(&read.to)?;
     let outputs: Vec<_> = std::iter::once(&places).chain(&of_recoveries).map(Mat::as_ref).collect();
     let measured = side_by_side(&outputs);

@@ -61,7 +61,7 @@ impl RandomResponse {
     /// Returns the largest estimated error of a recovery: of the von Mises stress where it has points, else of its rows;
     /// zero if no error is known.
     pub fn worst_error(&self) -> f64 {
-        let errors = self.recoveries.iter().filter_map(|one| one.errors);
+        let errors = self.recoveries.iter().filter_map(|recovery| recovery.errors);
         errors.map(|errors| errors.von_mises.unwrap_or(errors.rows)).fold(0.0, larger)
     }
 }
@@ -164,7 +164,8 @@ impl RandomStudy<'_> {
         let instants = self.frequencies();
         let covariance = self.covariance(&instants);
         let body = &self.framed.at_centre;
-        let recoveries = body.recoveries().iter().map(|one| self.recovery(one, &covariance)).collect();
+        let recoveries =
+            body.recoveries().iter().map(|recovery| self.recovery(recovery, &covariance)).collect();
         let inputs = self.inputs.iter().enumerate();
         let square = |i: usize| -> f64 {
             instants.iter().map(|&(hertz, weight)| weight * self.densities.at(hertz)[(i, i)].re).sum()
@@ -258,7 +259,7 @@ impl RandomStudy<'_> {
 
     /// Returns true if a recovery has columns of the rates of the modal coordinates.
     fn has_rates(&self) -> bool {
-        let has = |one: &Recovery| RATE_LOADS.iter().any(|load| one.of_motion(*load).is_some());
+        let has = |recovery: &Recovery| RATE_LOADS.iter().any(|load| recovery.of_motion(*load).is_some());
         self.framed.at_centre.recoveries().iter().any(has)
     }
 

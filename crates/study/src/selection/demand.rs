@@ -71,7 +71,7 @@ impl<'c> Demand<'c> {
         let (body, scene) = (&*framed.body, &*framed.scene);
         let (loads, _) = points_of(body, scene)?;
         let cases =
-            framed.scenes.iter().map(|one| Case::new(body, one, context)).collect::<Result<Vec<_>>>()?;
+            framed.scenes.iter().map(|scene| Case::new(body, scene, context)).collect::<Result<Vec<_>>>()?;
         let bounds = bounded(&cases, tier_1)?;
         Ok(Self {
             name,

@@ -171,7 +171,7 @@ impl<'s> SelectionState<'s> {
             }
             let warning = stress_error.as_ref().and_then(|own| own.warning(demand.body));
             self.diagnostics.extend(warning.map(|said| demand.about(said)));
-            let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
+            let largest = references.iter().map(|reference| reference.extremes.spin).fold(0.0, f64::max);
             let allowed = demand.situation.spin.value;
             let is_given = demand.scene.requirements.motion.angular_velocity.is_some();
             if allowed > SLACK_OF_RANGE * largest && is_given {

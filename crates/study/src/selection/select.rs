@@ -77,7 +77,7 @@ impl Selection {
     /// and missing stress stiffness take at most half of the tolerances each, also in every stated variation. True if nothing
     /// was measured.
     pub fn holds(&self) -> bool {
-        let in_variations = self.varied.iter().all(|one| one.holds() || !one.is_required);
+        let in_variations = self.varied.iter().all(|variation| variation.holds() || !variation.is_required);
         let is_reference = self.reference_errors.last().is_none_or(ReferenceError::is_reference)
             && self.stress_error.as_ref().is_none_or(StressError::is_small);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
@@ -211,7 +211,7 @@ pub fn select_judged(
         inputs: inputs(&demands),
         tolerance: cases.least_tolerance().errors,
         significances: largest_significances(
-            demands.iter().map(|one| significances(&one.situation, one.body)),
+            demands.iter().map(|demand| significances(&demand.situation, demand.body)),
         ),
         multiplications: multiplications(first.body, first.body.invariants().groups()),
         guideline: guideline(choice.groups),
@@ -296,7 +296,7 @@ pub(super) fn worst_reference_errors(demands: &[Demand<'_>]) -> Vec<ReferenceErr
 
 /// Returns the largest error of any load case by the missing stress stiffness of the spin.
 fn worst_stress_error(demands: &[Demand<'_>]) -> Option<StressError> {
-    first_largest(demands.iter().filter_map(|one| one.stress_error.clone()), |one| one.worst)
+    first_largest(demands.iter().filter_map(|demand| demand.stress_error.clone()), |one| one.worst)
 }
 
 /// Returns the decisions with those about the groups that variations need in place of those by the scene alone.
@@ -319,8 +319,9 @@ fn needed_by_variations(
     varied: &[VariedSelection],
     cases: &LoadCases,
 ) -> (TermDecision, Option<DecisiveError>) {
-    let without =
-        |one: &VariedSelection| Some((one.name.clone(), one.case.clone(), one.with_all_modes.clone()?));
+    let without = |variation: &VariedSelection| {
+        Some((variation.name.clone(), variation.case.clone(), variation.with_all_modes.clone()?))
+    };
     let worst = first_largest(varied.iter().filter_map(without), |one| one.2.worst);
     let error = worst.as_ref().and_then(|(_, case, trial)| {
         let at = (0..cases.len()).find(|at| cases.case_name(*at) == case.as_deref());

@@ -272,7 +272,7 @@ impl<'v> VariedRuns<'v> {
 /// Returns a note that a variation judges nothing, if `error` says that its simulation stopped.
 pub(crate) fn stops(error: &Error, variation: &SceneVariation) -> Option<Diagnostic> {
     let first = error.diagnostics().first()?;
-    error.diagnostics().iter().all(|one| ends_a_run(one.code())).then(|| {
+    error.diagnostics().iter().all(|diagnostic| ends_a_run(diagnostic.code())).then(|| {
         let message = format!("variation `{}` judges nothing: {}", variation.name, first.message());
         Diagnostic::new(Code::VariationStops, message)
     })

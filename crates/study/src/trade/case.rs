@@ -56,7 +56,7 @@ impl<'m> StudyCase<'m> {
         let whole = sources[0].body();
         nodal.map(|model| NodalReference::refuse(model, whole, scene, context)).transpose()?;
         let framed = FramedScene::new(whole, scene)?;
-        let sources = sources.iter().map(|one| one.in_frame_of(scene)).collect::<Result<Vec<_>>>()?;
+        let sources = sources.iter().map(|source| source.in_frame_of(scene)).collect::<Result<Vec<_>>>()?;
         // The candidates decide about the groups, not the scene.
         let mut scene = framed.scene.into_owned();
         scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
@@ -348,7 +348,7 @@ impl<'j> Judge<'j> {
         in_scene: Recommendation,
         context: &Context<'_>,
     ) -> Result<Recommendation> {
-        let is_required = self.variations.iter().any(|one| one.is_required);
+        let is_required = self.variations.iter().any(|variation| variation.is_required);
         let (wanted, is_limited) = match in_scene {
             Recommendation::None => return Ok(in_scene),
             Recommendation::MostAccurate(row) => (vec![row], true),
@@ -383,7 +383,9 @@ impl<'j> Judge<'j> {
         let run = |case, measure| progress.follow(1, |context| measured(case, measure, &own, context));
         let measured = |(case, measure)| match run(case, measure) {
             Ok(found) => Ok(Some(found)),
-            Err(error) if error.diagnostics().iter().all(|one| ends_a_run(one.code())) => Ok(None),
+            Err(error) if error.diagnostics().iter().all(|diagnostic| ends_a_run(diagnostic.code())) => {
+                Ok(None)
+            }
             Err(error) => Err(error),
         };
         let by_variation = parallel::try_map(self.cases.iter().zip(measures), measured)?;

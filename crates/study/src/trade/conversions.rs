@@ -260,7 +260,7 @@ impl<'m> ConversionContext<'m> {
         cases: &LoadCases,
     ) -> Result<Varied> {
         let variations = cases.variations(self.model.dimension());
-        let scenes: Vec<Scene> = variations.iter().map(|one| one.scene.clone()).collect();
+        let scenes: Vec<Scene> = variations.iter().map(|variation| variation.scene.clone()).collect();
         let has_runs = scenes.iter().all(|scene| scene.run.duration.is_some());
         let Some(scenes) = LoadCases::new(scenes).filter(|_| has_runs) else {
             return Ok(Varied::default());

@@ -71,12 +71,17 @@ impl<'m> NodalRecoveries<'m> {
             return Ok(None);
         };
         let one = |name: &str| {
-            let known = model.recoveries().iter().find(|one| one.name == name);
-            let of_shapes = |one: &&ModelRecovery| !matches!(one.operator, RecoveryOperator::Shapes { .. });
+            let known = model.recoveries().iter().find(|recovery| recovery.name == name);
+            let of_shapes =
+                |recovery: &&ModelRecovery| !matches!(recovery.operator, RecoveryOperator::Shapes { .. });
             let asked = known.filter(of_shapes).ok_or_else(|| {
                 refused(format!("recovery `{name}` is not known for the displacements of all nodes"))
             })?;
-            let offset = body.recoveries().iter().find(|one| one.name == name).map(|one| one.offset.clone());
+            let offset = body
+                .recoveries()
+                .iter()
+                .find(|recovery| recovery.name == name)
+                .map(|recovery| recovery.offset.clone());
             Ok((asked, offset.unwrap_or_default()))
         };
         let asked = measure.names().map(one).collect::<Result<Vec<_>>>()?;

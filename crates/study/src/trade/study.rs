@@ -126,7 +126,7 @@ impl Trade {
     /// Returns true if the recommended row holds in all required variations.
     pub fn holds_in_required_variations(&self) -> bool {
         let recommended = self.recommended.row().and_then(|row| self.rows[row].outcome.as_ref().ok());
-        let are_required = self.variations.iter().any(|one| one.is_required);
+        let are_required = self.variations.iter().any(|variation| variation.is_required);
         !are_required || recommended.is_none_or(Measured::holds_in_variations)
     }
 

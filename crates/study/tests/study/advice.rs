@@ -27,7 +27,7 @@ fn a_slow_body_qualifies_for_guideline_one_and_a_fast_one_needs_all() {
     // Guidelines keep more and more terms, so that what is left out never grows.
     for own in [&slow, &fast] {
         assert!(own.guidelines.windows(2).all(|pair| pair[0].ratio >= pair[1].ratio));
-        assert_eq!(own.guidelines.last().map(|one| one.ratio), Some(0.0));
+        assert_eq!(own.guidelines.last().map(|guideline| guideline.ratio), Some(0.0));
     }
 }
 

@@ -49,7 +49,7 @@ fn beam() -> RawModel {
 /// Returns a body without columns of some forces of motion.
 fn without(body: &FlexBody, load: &[MotionLoad]) -> FlexBody {
     let mut parts = body.clone().into_parts();
-    parts.recoveries.iter_mut().for_each(|one| one.motion.retain(|own| !load.contains(&own.load)));
+    parts.recoveries.iter_mut().for_each(|recovery| recovery.motion.retain(|own| !load.contains(&own.load)));
     FlexBody::new(parts).expect("a body")
 }
 

@@ -326,7 +326,7 @@ fn responses_to_a_named_load_are_those_to_the_interface_load() {
     assert_eq!(named.pairs[0].functions[0].from, Direction::Amplitude);
     let values = |response: &flexbody_study::response::Response| -> Vec<f64> {
         let functions = response.pairs.iter().flat_map(|pair| &pair.functions);
-        functions.flat_map(|one| one.reduced.iter().flat_map(|z| [z.re, z.im])).collect()
+        functions.flat_map(|function| function.reduced.iter().flat_map(|z| [z.re, z.im])).collect()
     };
     let error = apart(&values(&named), &values(&at_tip));
     assert!(error < 1e-11, "{error:e}");
@@ -350,10 +350,10 @@ fn a_preload_is_the_state_of_rest() {
     let mut scene = nothing_happens("at rest", TAU / few.modes().eigenvalue[0].sqrt(), 1e-10);
     scene.run.outputs = 4;
     let (_, found) = simulate(&few, &scene, &Context::QUIET).expect("a run");
-    assert!(found.iter().any(|one| one.code() == Code::PreloadReleased), "{found:?}");
+    assert!(found.iter().any(|diagnostic| diagnostic.code() == Code::PreloadReleased), "{found:?}");
     scene.initial.settled = true;
     let (run, found) = simulate(&few, &scene, &Context::QUIET).expect("a run");
-    assert!(found.iter().all(|one| one.code() != Code::PreloadReleased), "{found:?}");
+    assert!(found.iter().all(|diagnostic| diagnostic.code() != Code::PreloadReleased), "{found:?}");
     let recovered = run.recovered.as_ref().expect("recoveries");
     for (state, z) in run.states.iter().zip(recovered.states.iter()) {
         // A preload turns nothing, though its forces on the deformed body have a moment.

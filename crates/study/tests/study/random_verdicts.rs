@@ -520,7 +520,7 @@ fn ratio_table(outcomes: &[Outcome], of: impl Fn(&Outcome) -> &Vec<(&'static str
     };
     for &start in Start::VARIANTS {
         for output in ["attitude", "deflection", "stress", "reaction"] {
-            let all = outcomes.iter().filter(|one| one.start == start).flat_map(&of);
+            let all = outcomes.iter().filter(|outcome| outcome.start == start).flat_map(&of);
             add(
                 start.name(),
                 output,
@@ -539,7 +539,7 @@ fn verdict_table(outcomes: &[Outcome]) -> String {
         "| start | accepted | least | 5 % | median | 95 % | largest | accepted above the tolerance | accepted of those below half of it | with modes to spare | most modes to spare |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for &start in Start::VARIANTS {
-        let all: Vec<&Outcome> = outcomes.iter().filter(|one| one.start == start).collect();
+        let all: Vec<&Outcome> = outcomes.iter().filter(|outcome| outcome.start == start).collect();
         let held: Vec<&&Outcome> = all.iter().filter(|one| one.verdict.0).collect();
         let Some(quantiles) = quantiles(held.iter().map(|one| one.verdict.1).collect()) else { continue };
         let cells = quantiles.map(|value| format!("{value:.2}")).join(" | ");
@@ -558,7 +558,7 @@ fn verdict_table(outcomes: &[Outcome]) -> String {
         );
     }
     let mut missed: Vec<&Outcome> =
-        outcomes.iter().filter(|one| one.verdict.0 && one.verdict.1 > 1.0).collect();
+        outcomes.iter().filter(|outcome| outcome.verdict.0 && outcome.verdict.1 > 1.0).collect();
     missed.sort_by(|a, b| b.verdict.1.total_cmp(&a.verdict.1));
     if !missed.is_empty() {
         page.push_str("\nAccepted above the tolerance:\n\n");
@@ -609,20 +609,20 @@ fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
     }
     if asked.is_none() {
         assert!(not_run.is_empty(), "{not_run:?}");
-        for one in outcomes {
-            let (holds, worst) = one.verdict;
-            assert!(!holds || worst <= 1.0, "{}: {worst}", one.what);
+        for outcome in outcomes {
+            let (holds, worst) = outcome.verdict;
+            assert!(!holds || worst <= 1.0, "{}: {worst}", outcome.what);
             assert!(
-                one.effectivity.iter().all(|(_, value)| one.start.near().contains(value)),
+                outcome.effectivity.iter().all(|(_, value)| outcome.start.near().contains(value)),
                 "{}: {:?}",
-                one.what,
-                one.effectivity
+                outcome.what,
+                outcome.effectivity
             );
             assert!(
-                one.stated.iter().all(|(_, value)| STATED.contains(value)),
+                outcome.stated.iter().all(|(_, value)| STATED.contains(value)),
                 "{}: {:?}",
-                one.what,
-                one.stated
+                outcome.what,
+                outcome.stated
             );
         }
     }
@@ -636,7 +636,8 @@ fn decisions(case: &Case, model: &FeModel) -> Result<String> {
     let enriched = tailoring.convert(model, &cases, &Context::QUIET)?;
     let rounds: Vec<usize> = enriched.rounds[0].iter().map(|round| round.modes).collect();
     let one = select(&enriched.made.body, &enriched.rounds, &cases, &Context::QUIET)?;
-    let variations: Vec<_> = one.varied.iter().map(|one| (&one.name, one.holds())).collect();
+    let variations: Vec<_> =
+        one.varied.iter().map(|variation| (&variation.name, variation.holds())).collect();
     let said: Vec<String> = one.diagnostics.iter().map(ToString::to_string).collect();
     let reasons: Vec<_> = one.terms.iter().map(|term| (term.group, term.kept, term.tier)).collect();
     Ok(format!(

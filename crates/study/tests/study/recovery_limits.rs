@@ -332,7 +332,7 @@ fn rows_of_shapes_have_no_estimate() {
     let of_shapes = FeModel::from_raw(raw).expect("a sound model").model;
     let estimate = estimated(&of_shapes, &few, &scene);
     assert_eq!(estimate.errors.recovery, None);
-    assert!(estimate.remarks(&scene).iter().any(|one| one.code() == Code::RecoveryUnjudged));
+    assert!(estimate.remarks(&scene).iter().any(|remark| remark.code() == Code::RecoveryUnjudged));
     assert!(estimated(&model, &few, &scene).remarks(&scene).is_empty());
     let framed = FramedScene::new(&few, &scene).expect("a stage");
     let (motion, _) = trace(&framed.body, &framed.scene, &Context::QUIET).expect("a motion");

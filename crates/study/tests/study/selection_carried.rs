@@ -89,7 +89,8 @@ fn a_bar_shaken_along_its_axis_takes_a_few_modes_and_no_group() {
     let ruled_out = rule_out(&linear, &scene, &Context::QUIET);
     assert_eq!(ruled_out.expect("decisions").len(), 3);
 
-    let told: Vec<(&str, bool)> = selection.varied.iter().map(|one| (&*one.name, one.holds())).collect();
+    let told: Vec<(&str, bool)> =
+        selection.varied.iter().map(|variation| (&*variation.name, variation.holds())).collect();
     let turned = |axis: &str| format!("translation turned by 10 degrees about {axis}");
     let (y, z) = (turned("y"), turned("z"));
     assert_eq!(told, [(&*y, false), (&*z, false), ("translation larger by 10 %", true)]);
@@ -99,7 +100,9 @@ fn a_bar_shaken_along_its_axis_takes_a_few_modes_and_no_group() {
     }
     // As a requirement they add modes.
     let robust = selected(&body, &cases(shaken(), "robust = true\n"));
-    assert!(robust.modes.len() > selection.modes.len() && robust.varied.iter().all(|one| one.holds()));
+    assert!(
+        robust.modes.len() > selection.modes.len() && robust.varied.iter().all(|variation| variation.holds())
+    );
     assert!(robust.holds());
 }
 

@@ -165,7 +165,7 @@ fn variations_add_groups_only_where_modes_are_not_enough() {
         let selection = select(body, &[], &cases, &Context::QUIET).expect("a selection");
         assert!(!selection.varied.is_empty());
         let groups_fail =
-            |one: &VariedSelection| one.with_all_modes.as_ref().is_some_and(|all| !all.passed());
+            |variation: &VariedSelection| variation.with_all_modes.as_ref().is_some_and(|all| !all.passed());
         let added = selection.terms.iter().any(|term| term.kept && term.reason.starts_with("variation `"));
         assert!(!added || selection.varied.iter().any(groups_fail), "{:?}", selection.terms);
         let more_modes = selection.varied.iter().any(|one| one.of_scene.is_some());

@@ -233,8 +233,9 @@ fn couplings_are_equations_of_their_directions() {
     let text = format!("{NODES}900,-1,.5,.5\n800,3,0,0\n{BRICKS}{STEEL}{SECTION}{coupling}{mean}");
     let has_row = |node, direction| node != 6 && (![1, 4].contains(&node) || direction == 2);
     let found = describe(&text, has_row, &[(900, 4), (900, 5), (900, 6)]).expect("described");
-    let equation =
-        |at: (i64, u8)| found.equations.iter().find(|one| one.dependent == at).map(|one| &one.terms[..]);
+    let equation = |at: (i64, u8)| {
+        found.equations.iter().find(|equation| equation.dependent == at).map(|equation| &equation.terms[..])
+    };
     assert_eq!(equation((1, 1)), Some(&[((900, 1), 1.0), ((900, 5), -0.5), ((900, 6), 0.5)][..]));
     assert_eq!(equation((1, 2)), None);
     assert_eq!(equation((6, 2)), Some(&[((800, 2), 3.0), ((3, 2), -2.0)][..]));
