@@ -92,9 +92,9 @@ impl std::error::Error for Error {}
 ///
 /// # Errors
 /// All diagnostics, which are removed from `found`.
-pub fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
-    if found.iter().any(|d| d.severity() == Severity::Error) {
-        return Err(Error::new(std::mem::take(found)));
+pub fn stop_on_error(diagnostics: &mut Vec<Diagnostic>) -> Result<()> {
+    if diagnostics.iter().any(|d| d.severity() == Severity::Error) {
+        return Err(Error::new(std::mem::take(diagnostics)));
     }
     Ok(())
 }

@@ -57,8 +57,8 @@ pub fn read_batch_list(path: &Path) -> Result<BatchList> {
     let text = read_text(path, MAX_BYTES).map_err(|e| wrong(format!("the list cannot be read: {e}")))?;
     let mut list: BatchList = toml::from_str(&text).map_err(|e| {
         let line = e.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
-        let found = Diagnostic::new(Code::BatchSyntax, e.message().to_owned());
-        Error::from(found.in_file(path).at_line(line))
+        let diagnostic = Diagnostic::new(Code::BatchSyntax, e.message().to_owned());
+        Error::from(diagnostic.in_file(path).at_line(line))
     })?;
     if list.bodies.is_empty() {
         return Err(wrong("the list has no [[body]]".to_owned()));

@@ -111,7 +111,7 @@ impl ManifestWalk<'_, '_> {
             if !top.contains_key("files") {
                 let message = "table [files] is missing".to_owned();
                 let nowhere = Diagnostic::new(Code::ManifestSyntax, message).in_file(self.path);
-                self.found.push(nowhere);
+                self.diagnostics.push(nowhere);
             }
             return None;
         };
@@ -232,7 +232,8 @@ impl ManifestWalk<'_, '_> {
         let Some(value) = table.get(key) else {
             let message = format!("key `{key}` is missing in [model.units]");
             let diagnostic = self.at(Code::ManifestSyntax, span, message);
-            self.found.push(diagnostic.with_help("state all three in [model.units]: length, mass, time"));
+            self.diagnostics
+                .push(diagnostic.with_help("state all three in [model.units]: length, mass, time"));
             return None;
         };
         let name = match value.get_ref() {
@@ -299,7 +300,7 @@ impl ManifestWalk<'_, '_> {
                 let message =
                     format!("`{text}` is not a set of loads for residual vectors, expected {EXPECTED}");
                 let complaint = self.at(Code::ManifestSyntax, item.span(), message);
-                self.found.push(complaint.with_help(
+                self.diagnostics.push(complaint.with_help(
                     "give other nodal forces in the file `loads`; \"loads@500\" names its responses at a frequency",
                 ));
                 continue;

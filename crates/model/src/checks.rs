@@ -79,33 +79,33 @@ pub fn check(raw: RawModel) -> Result<CheckedModel> {
 }
 
 /// Checks a body: its mass, its connections, its rigid motion.
-pub(crate) fn check_body(mut body: Assembled, mut found: Vec<Diagnostic>) -> Result<CheckedModel> {
-    found.extend(check_exchanged_matrices(&body));
-    stop_on_error(&mut found)?;
+pub(crate) fn check_body(mut body: Assembled, mut diagnostics: Vec<Diagnostic>) -> Result<CheckedModel> {
+    diagnostics.extend(check_exchanged_matrices(&body));
+    stop_on_error(&mut diagnostics)?;
     let given = body.followers.take();
     let followers = given.and_then(|given| Followers::new(&given, &body.rows, &body.nodes));
     let own_mass = followers.as_ref().map(|followers| followers.own_mass(body.rows.len()));
-    let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, own_mass.as_ref(), &mut found);
-    stop_on_error(&mut found)?;
-    let form = form_of_mass(&body, &mut found);
-    check_connections(&body, &mut found);
-    let rigid_residual = check_rigid_motions(&mut body, &mut found)?;
-    stop_on_error(&mut found)?;
+    let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, own_mass.as_ref(), &mut diagnostics);
+    stop_on_error(&mut diagnostics)?;
+    let form = form_of_mass(&body, &mut diagnostics);
+    check_connections(&body, &mut diagnostics);
+    let rigid_residual = check_rigid_motions(&mut body, &mut diagnostics)?;
+    stop_on_error(&mut diagnostics)?;
     let mut form = form.expect("a missing mass comes with an error");
     // Vectors that rigid motion moves have no position x in the formulas for Ms.
     form.commutes &= body.rows.are_still();
     if !form.commutes {
-        check_inertia(&body, rounding(body.origin.mass.digits, 3).max(1e-9), &mut found);
-        stop_on_error(&mut found)?;
+        check_inertia(&body, rounding(body.origin.mass.digits, 3).max(1e-9), &mut diagnostics);
+        stop_on_error(&mut diagnostics)?;
     }
     let diagonal_mass = is_diagonal(&body.mass);
-    note_structure(&body, diagonal_mass, &mut found);
+    note_structure(&body, diagonal_mass, &mut diagnostics);
     let plausibility = Plausibility {
         mass_pairs,
         foreign_pairs,
-        ..check_local_mass(&body, &form, diagonal_mass, &mut found)
+        ..check_local_mass(&body, &form, diagonal_mass, &mut diagnostics)
     };
-    stop_on_error(&mut found)?;
+    stop_on_error(&mut diagnostics)?;
     let mass_rounding = block_tolerance(body.origin.mass.digits);
     let mass_path = body.origin.mass.path.clone();
     let stress_files = std::mem::take(&mut body.origin.geometric_stiffness);
@@ -114,26 +114,26 @@ pub(crate) fn check_body(mut body: Assembled, mut found: Vec<Diagnostic>) -> Res
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass).with_followers(followers);
     model.find_fixed_mass(mass_rounding);
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);
-    let follows = found.iter().any(|note| note.code() == Code::DeckConstrained)
+    let follows = diagnostics.iter().any(|note| note.code() == Code::DeckConstrained)
         && model.followers().is_none_or(|points| !points.are_all());
-    found.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
-    check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
+    diagnostics.extend(kept.map(|note| with_help_for_dependents(note, follows).in_file(&mass_path)));
+    check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut diagnostics);
     let density = plausibility.densities.map(|densities| densities.quartiles[1]);
-    check_stresses(&model, density, allowed, &mut found);
-    note_stress_points(&model, &mut found);
-    stop_on_error(&mut found)?;
+    check_stresses(&model, density, allowed, &mut diagnostics);
+    note_stress_points(&model, &mut diagnostics);
+    stop_on_error(&mut diagnostics)?;
     // Stresses of elements that K proves need no comparison with K.
     let asked = model.take_nodal_stresses();
-    model.add_nodal_stresses(&asked).map_err(|error| error.after(std::mem::take(&mut found)))?;
+    model.add_nodal_stresses(&asked).map_err(|error| error.after(std::mem::take(&mut diagnostics)))?;
     // Compute the fingerprints now, so that the files need not stay open.
     model.find_sources()?;
-    Ok(CheckedModel { model, diagnostics: found, plausibility })
+    Ok(CheckedModel { model, diagnostics, plausibility })
 }
 
 /// Returns the form of the mass matrix; `None` with a diagnostic if it belongs to no physical body.
-fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassForm> {
+fn form_of_mass(body: &Assembled, diagnostics: &mut Vec<Diagnostic>) -> Option<MassForm> {
     let form = mass_form(&body.mass, &body.rows, block_tolerance(body.origin.mass.digits));
-    form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.origin.mass.path))).ok()
+    form.map_err(|diagnostic| diagnostics.push(diagnostic.in_file(&body.origin.mass.path))).ok()
 }
 
 /// Finds the rigid motion of every row, and checks that K and the other matrices leave it free. Returns the
@@ -141,29 +141,29 @@ fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassFor
 ///
 /// # Errors
 /// Rows without a position whose motion K does not determine, with all earlier findings.
-fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Result<f64> {
+fn check_rigid_motions(body: &mut Assembled, diagnostics: &mut Vec<Diagnostic>) -> Result<f64> {
     if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
-        found.push(diagnostic.in_file(&body.origin.stiffness.path));
-        stop_on_error(found)?;
+        diagnostics.push(diagnostic.in_file(&body.origin.stiffness.path));
+        stop_on_error(diagnostics)?;
     }
     let label = |row: usize| body.rows.label(&body.nodes, row);
     if let Some(diagnostic) = misplaced(&body.rows) {
-        found.push(diagnostic.in_file(&body.origin.nodes_path));
+        diagnostics.push(diagnostic.in_file(&body.origin.nodes_path));
     } else if let Some(diagnostic) = refuse_turned_internals(&body.mass, &body.rows, &body.nodes) {
-        found.push(diagnostic.in_file(&body.origin.mass.path));
+        diagnostics.push(diagnostic.in_file(&body.origin.mass.path));
     }
     if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
-        found.push(diagnostic.in_file(&body.origin.stiffness.path));
+        diagnostics.push(diagnostic.in_file(&body.origin.stiffness.path));
     }
     let written = body.origin.stiffness.digits;
     let rounded = rounding(written, 1).max(1e-9);
     let limit = rounding(written, 3).max(1e-6);
-    let rigid_residual = check_rigid_motion(body, rounded, limit, found);
-    check_rigid_damping(body, found);
-    found.extend(check_rigid_responses(&body.data.recoveries, &body.rows, &body.nodes));
-    found.extend(refuse_stiff_preloads(&body.data.named_loads, &body.data.geometric_stiffness));
-    found.extend(check_preloads(&body.data.named_loads, &body.rows, &body.nodes));
-    found.extend(missing_components(&body.data.geometric_stiffness, body.rows.dimension));
+    let rigid_residual = check_rigid_motion(body, rounded, limit, diagnostics);
+    check_rigid_damping(body, diagnostics);
+    diagnostics.extend(check_rigid_responses(&body.data.recoveries, &body.rows, &body.nodes));
+    diagnostics.extend(refuse_stiff_preloads(&body.data.named_loads, &body.data.geometric_stiffness));
+    diagnostics.extend(check_preloads(&body.data.named_loads, &body.rows, &body.nodes));
+    diagnostics.extend(missing_components(&body.data.geometric_stiffness, body.rows.dimension));
     Ok(rigid_residual)
 }
 
@@ -173,18 +173,18 @@ fn check_local_mass(
     body: &Assembled,
     form: &MassForm,
     diagonal_mass: bool,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Plausibility {
     let local = LocalMass::new(body, &form.scalar);
     // Lumping moves mass between the nodes of an element: skip the check.
-    let exchanged_pairs = if diagonal_mass { 0 } else { check_exchanged(body, &local, found) };
-    let before = found.len();
+    let exchanged_pairs = if diagonal_mass { 0 } else { check_exchanged(body, &local, diagnostics) };
+    let before = diagnostics.len();
     let densities = Densities::new(body, &local, diagonal_mass);
-    let density = check_density(body, densities, &local, found);
-    if found.len() == before {
-        check_plausibility(&form.scalar, body, found);
+    let density = check_density(body, densities, &local, diagnostics);
+    if diagnostics.len() == before {
+        check_plausibility(&form.scalar, body, diagnostics);
     }
-    check_speed(body, &local, density, found);
+    check_speed(body, &local, density, diagnostics);
     let sound_speed = local.sound_speed(body.rows.dimension);
     Plausibility { mass_pairs: 0, foreign_pairs: 0, exchanged_pairs, sound_speed, densities }
 }
@@ -194,11 +194,11 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
 }
 
 /// Adds notes about the kind of mass and of rows, unless they are plain.
-fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
+fn note_structure(body: &Assembled, diagonal_mass: bool, diagnostics: &mut Vec<Diagnostic>) {
     let (origin, rows) = (&body.origin, &body.rows);
     if diagonal_mass {
         let message = "mass matrix is diagonal: the program that wrote it lumped the mass";
-        found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&origin.mass.path));
+        diagnostics.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&origin.mass.path));
     }
     let [vectors, others] = rows.without_place();
     if !(vectors.is_empty() && others.is_empty()) {
@@ -212,7 +212,7 @@ fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnos
             others.len(),
             name_some(&labels)
         );
-        found.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&origin.nodes_path));
+        diagnostics.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&origin.nodes_path));
     }
 }
 
@@ -249,13 +249,13 @@ fn with_help_for_dependents(note: Diagnostic, follows: bool) -> Diagnostic {
 }
 
 /// Adds a warning if D damps rigid motion: forces on the motion of the whole body are not in the modes.
-fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
+fn check_rigid_damping(body: &Assembled, diagnostics: &mut Vec<Diagnostic>) {
     /// Residual due to node tables with few digits.
     const MAX_RIGID_DAMPING: f64 = 1e-6;
     if let Some(Damping::Rayleigh { alpha, .. }) = &body.data.damping {
         if *alpha > 0.0 {
             let message = "alpha M resists rigid motion; only the damping of the deformation is kept: that of motion relative to mean axes or, of a carried body, to its carrier";
-            found.push(Diagnostic::new(Code::DampingRigid, message.to_owned()));
+            diagnostics.push(Diagnostic::new(Code::DampingRigid, message.to_owned()));
         }
         return;
     }
@@ -270,7 +270,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
             "D R is not zero for {damped} of {} rows: |D R| reaches {worst:.1e} of the row sum of |D|; only the damping of the modes is kept",
             residuals.len()
         );
-        found.push(Diagnostic::new(Code::DampingRigid, message));
+        diagnostics.push(Diagnostic::new(Code::DampingRigid, message));
     }
 }
 
@@ -278,7 +278,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
 /// for bodies other than solids.
 const PLAUSIBLE_DENSITY: (f64, f64) = (0.1, 30_000.0);
 
-fn check_plausibility(mass: &SymmetricMatrix, body: &Assembled, found: &mut Vec<Diagnostic>) {
+fn check_plausibility(mass: &SymmetricMatrix, body: &Assembled, diagnostics: &mut Vec<Diagnostic>) {
     if !body.has_units() {
         return;
     }
@@ -294,12 +294,12 @@ fn check_plausibility(mass: &SymmetricMatrix, body: &Assembled, found: &mut Vec<
         let [mass, x, y, z] = [total, x, y, z].map(|value| significant(value, 4));
         let message =
             format!("{mass} kg in a box of {x} x {y} x {z} m is {} kg/m^3", significant(density, 2));
-        found.push(Diagnostic::new(Code::InertiaImplausible, message));
+        diagnostics.push(Diagnostic::new(Code::InertiaImplausible, message));
     }
 }
 
 /// Checks that K and M together make one body, and that K alone holds it together.
-fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
+fn check_connections(body: &Assembled, diagnostics: &mut Vec<Diagnostic>) {
     let Assembled { origin, nodes, rows, stiffness, mass, .. } = body;
     let component = rows.components(&[stiffness]);
     if component.iter().all(|&c| c == 0) {
@@ -308,7 +308,7 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let bodies = groups(&rows.components(&[stiffness, mass]), rows, nodes);
     if bodies.len() > 1 {
         let message = format!("the matrices hold {} separate bodies: {}", bodies.len(), in_words(&bodies));
-        found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&origin.stiffness.path));
+        diagnostics.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&origin.stiffness.path));
         return;
     }
     // K R = 0 holds for each part by itself: each has rigid motions of its own for any mass coupling.
@@ -318,7 +318,7 @@ fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
         parts.len(),
         in_words(&parts)
     );
-    found.push(Diagnostic::new(Code::Mechanism, message).in_file(&origin.stiffness.path));
+    diagnostics.push(Diagnostic::new(Code::Mechanism, message).in_file(&origin.stiffness.path));
 }
 
 /// Returns the node numbers of every component, in the order of their first nodes.

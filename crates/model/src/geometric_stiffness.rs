@@ -187,11 +187,11 @@ pub(crate) fn check_loads(
     given: &[GeometricStiffness<RawMatrix>],
     interfaces: &[NodeSet],
     dimension: usize,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     for (i, GeometricStiffness { load, matrix }) in given.iter().enumerate() {
         let mut complain =
-            |code, message: String| found.push(Diagnostic::new(code, message).in_file(&matrix.path));
+            |code, message: String| diagnostics.push(Diagnostic::new(code, message).in_file(&matrix.path));
         let (kind, name) = (&load.kind, load.to_string());
         if !kind.of_dimension(dimension).contains(&load.component) {
             let have: Vec<&str> =
@@ -218,7 +218,7 @@ pub(crate) fn check_loads(
             let message =
                 format!("geometric stiffness is given for {name}; interfaces of the model: {known}");
             let complaint = Diagnostic::new(Code::InterfaceNode, message).in_file(&matrix.path);
-            found.push(complaint.with_help("name an [[interface]] of the manifest"));
+            diagnostics.push(complaint.with_help("name an [[interface]] of the manifest"));
         }
     }
 }

@@ -53,7 +53,7 @@ pub(crate) fn checked_loads(
     of_files: &RowsOfFiles<'_>,
     interfaces: &[NodeSet],
     rows: &Rows,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<ModelLoad> {
     let mut names = HashSet::new();
     let mut checked = Vec::with_capacity(given.len());
@@ -65,7 +65,7 @@ pub(crate) fn checked_loads(
             Ok(forces) => checked.push(ModelLoad { forces, ..load }),
             Err((code, message)) => {
                 let message = format!("named load {message}");
-                found.push(Diagnostic::new(code, message).in_file(&load.path));
+                diagnostics.push(Diagnostic::new(code, message).in_file(&load.path));
             }
         }
     }
@@ -201,7 +201,7 @@ pub(crate) fn loads_of_body(all: &[ModelLoad], kept: &[usize]) -> Vec<ModelLoad>
 pub(crate) fn refuse_loads_of_several_bodies(
     all: &[ModelLoad],
     body_of_row: impl Fn(usize) -> usize,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     for load in all {
         let loaded = load.forces.iter().enumerate().filter(|(_, force)| **force != 0.0);
@@ -209,7 +209,7 @@ pub(crate) fn refuse_loads_of_several_bodies(
         if bodies.len() > 1 {
             let message = format!("named load `{}` acts on {} bodies", load.name, bodies.len());
             let diagnostic = Diagnostic::new(Code::BodiesCoupled, message).in_file(&load.path);
-            found.push(diagnostic.with_help("give one [[named_load]] for each body"));
+            diagnostics.push(diagnostic.with_help("give one [[named_load]] for each body"));
         }
     }
 }

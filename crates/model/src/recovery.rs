@@ -226,7 +226,7 @@ pub(crate) fn checked_recoveries(
     asked: Vec<ModelRecovery>,
     of_files: &RowsOfFiles<'_>,
     nodes: &Nodes,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<ModelRecovery> {
     let mut names = HashSet::new();
     let mut checked = Vec::with_capacity(asked.len());
@@ -248,7 +248,7 @@ pub(crate) fn checked_recoveries(
         };
         match result {
             Ok(operator) => checked.push(ModelRecovery { name, operator, path, deformed_inertia }),
-            Err(problem) => found.push(complain(problem)),
+            Err(problem) => diagnostics.push(complain(problem)),
         }
     }
     checked
@@ -507,7 +507,7 @@ pub(crate) fn refuse_several_bodies(
     all: &[ModelRecovery],
     body_of_row: impl Fn(usize) -> usize,
     body_of_node: impl Fn(i64) -> Option<usize>,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     for recovery in all {
         let mut bodies: Vec<usize> = match &recovery.operator {
@@ -527,7 +527,7 @@ pub(crate) fn refuse_several_bodies(
             let message =
                 format!("recovery `{}` reads {} bodies: {}", recovery.name, bodies.len(), name_some(&bodies));
             let diagnostic = Diagnostic::new(Code::BodiesCoupled, message).in_file(&recovery.path);
-            found.push(diagnostic.with_help("give one [[recovery]] for each body"));
+            diagnostics.push(diagnostic.with_help("give one [[recovery]] for each body"));
         }
     }
 }

@@ -15,7 +15,7 @@ pub type TomlTable<'t> = DeTable<'t>;
 /// Value of a TOML document, with its position.
 pub type Value<'t> = Spanned<DeValue<'t>>;
 
-/// Reads `path`, a file of the given `kind`, with `walk`, which may return `None` only if `found` has an entry.
+/// Reads `path`, a file of the given `kind`, with `walk`, which may return `None` only if `diagnostics` has an entry.
 /// `syntax` is the code of violations.
 ///
 /// # Errors
@@ -45,7 +45,7 @@ pub fn parse_toml<T>(
     syntax: Code,
     walk: impl FnOnce(&mut Walk<'_>, &TomlTable<'_>) -> Option<T>,
 ) -> Result<T> {
-    let mut tables = Walk { path, text, syntax, line_ends: LineEnds::of(text), found: Vec::new() };
+    let mut tables = Walk { path, text, syntax, line_ends: LineEnds::of(text), diagnostics: Vec::new() };
     let (document, errors) = DeTable::parse_recoverable(text);
     for error in &errors {
         let message = error.message().to_owned();
@@ -54,7 +54,7 @@ pub fn parse_toml<T>(
     // After a syntax error the rest of the document is unreliable.
     let read = if errors.is_empty() { walk(&mut tables, document.get_ref()) } else { None };
     match read {
-        Some(read) if tables.found.is_empty() => Ok(read),
+        Some(read) if tables.diagnostics.is_empty() => Ok(read),
         _ => Err(Error::new(tables.into_findings())),
     }
 }
@@ -86,7 +86,7 @@ pub struct Walk<'a> {
     syntax: Code,
     line_ends: LineEnds,
     /// All findings so far.
-    pub found: Vec<Diagnostic>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Walk<'_> {
@@ -94,14 +94,14 @@ impl Walk<'_> {
     fn into_findings(mut self) -> Vec<Diagnostic> {
         /// Largest number of findings that are listed.
         const MAX_SHOWN: usize = 200;
-        self.found.sort_by_key(Diagnostic::line);
-        let more = self.found.len().saturating_sub(MAX_SHOWN);
-        self.found.truncate(MAX_SHOWN);
+        self.diagnostics.sort_by_key(Diagnostic::line);
+        let more = self.diagnostics.len().saturating_sub(MAX_SHOWN);
+        self.diagnostics.truncate(MAX_SHOWN);
         if more > 0 {
             let message = format!("{more} more findings are not shown");
-            self.found.push(Diagnostic::new(self.syntax, message).in_file(self.path));
+            self.diagnostics.push(Diagnostic::new(self.syntax, message).in_file(self.path));
         }
-        self.found.into_iter().map(|one| without_foreign_quotes(one, self.path)).collect()
+        self.diagnostics.into_iter().map(|one| without_foreign_quotes(one, self.path)).collect()
     }
 
     /// Returns the SHA-256 of the file.
@@ -119,7 +119,7 @@ impl Walk<'_> {
 
     /// Adds a diagnostic about the text at `span`.
     pub fn complain(&mut self, code: Code, span: Range<usize>, message: String) {
-        self.found.push(self.at(code, span, message));
+        self.diagnostics.push(self.at(code, span, message));
     }
 
     /// Adds a violation of the file's format.
@@ -145,7 +145,7 @@ impl Walk<'_> {
                 Some((_, candidate)) => format!("did you mean `{candidate}`?"),
                 None => format!("use one of the keys {}", known.join(", ")),
             };
-            self.found.push(unknown.with_help(help));
+            self.diagnostics.push(unknown.with_help(help));
         }
     }
 

@@ -217,7 +217,7 @@ fn dependent_on_others(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diag
     for group in Conditions::of(joints).iter().filter(|group| !group.are_independent(joints)) {
         group.joints.iter().for_each(|&j| is_dependent[j] = true);
     }
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     let mut owners: HashMap<usize, Vec<usize>> = HashMap::new();
     for (j, joint) in joints.iter().enumerate() {
         let is_conflict = |&other: &usize| {
@@ -239,10 +239,10 @@ fn dependent_on_others(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diag
                 model.nodes().ids[node],
                 joints[other].name
             );
-            found.push(Diagnostic::new(Code::InterfaceShared, message));
+            diagnostics.push(Diagnostic::new(Code::InterfaceShared, message));
         }
     }
-    found
+    diagnostics
 }
 
 /// Returns an error if all interfaces together leave the body free to turn.

@@ -193,18 +193,18 @@ pub(super) fn columns(model: &FeModel, raw: RawShapes, given: Given) -> Result<M
         let message = format!("{k} {what}s have {n} rows, the matrices have {}", model.matrix_rows());
         return Err(refuse(Code::ShapesSize, message).into());
     }
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     for j in 0..k {
         let column = raw.matrix.col(j);
         if let Some(row) = column.iter().position(|value| !value.is_finite()) {
             let message = format!("{what} {} has {} in row {}", j + 1, column[row], row + 1);
-            found.push(refuse(Code::MatrixNotFinite, message));
+            diagnostics.push(refuse(Code::MatrixNotFinite, message));
         } else if column.iter().all(|&value| value == 0.0) {
-            found.push(refuse(Code::ShapesZero, format!("{what} {} is zero everywhere", j + 1)));
+            diagnostics.push(refuse(Code::ShapesZero, format!("{what} {} is zero everywhere", j + 1)));
         }
     }
-    if !found.is_empty() {
-        return Err(Error::new(found));
+    if !diagnostics.is_empty() {
+        return Err(Error::new(diagnostics));
     }
     let rows = match given {
         Given::Shapes => model.given_rows().motions(raw.matrix),

@@ -105,9 +105,9 @@ impl SolvedModes {
     /// whose name then appears.
     fn completeness(&self, model: &FeModel, rigid: usize, stated: Completeness) -> Result<Completeness> {
         let missing = |message: String| {
-            let found = Diagnostic::new(Code::CompletenessFailed, message);
+            let diagnostic = Diagnostic::new(Code::CompletenessFailed, message);
             Err(Error::from(
-                found.with_help("run the driver again: it searches for the modes that are missing"),
+                diagnostic.with_help("run the driver again: it searches for the modes that are missing"),
             ))
         };
         if self.prove {

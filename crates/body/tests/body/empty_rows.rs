@@ -23,11 +23,11 @@ fn converted(model: &FeModel, modes: usize, method: Method) -> Conversion {
         .expect("converts")
 }
 
-fn told(found: &[Diagnostic], code: Code) -> String {
-    found
+fn told(diagnostics: &[Diagnostic], code: Code) -> String {
+    diagnostics
         .iter()
         .find(|diagnostic| diagnostic.code() == code)
-        .unwrap_or_else(|| panic!("{found:?}"))
+        .unwrap_or_else(|| panic!("{diagnostics:?}"))
         .message()
         .to_owned()
 }

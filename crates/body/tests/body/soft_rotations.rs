@@ -18,8 +18,8 @@ fn converted(model: &FeModel, modes: usize, method: Method) -> Conversion {
         .expect("converts")
 }
 
-fn find(found: &[Diagnostic], code: Code) -> Option<&str> {
-    found.iter().find(|diagnostic| diagnostic.code() == code).map(Diagnostic::message)
+fn find(diagnostics: &[Diagnostic], code: Code) -> Option<&str> {
+    diagnostics.iter().find(|diagnostic| diagnostic.code() == code).map(Diagnostic::message)
 }
 
 /// Returns the largest deviation of eigenvalues from `expected`, relative.

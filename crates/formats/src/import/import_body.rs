@@ -482,7 +482,7 @@ pub(crate) fn axes_without_inertia(inertia: &Numbered) -> f64 {
 /// [`ForeignUnsound`](Code::ForeignUnsound), one diagnostic for every violated identity.
 pub fn accept_imported(imported: &Imported) -> Result<()> {
     let broken = body_identities(&imported.body).into_iter().filter(|check| !check.passed);
-    let found: Vec<Diagnostic> = broken
+    let diagnostics: Vec<Diagnostic> = broken
         .map(|check| {
             let message = format!(
                 "the numbers of the file violate the identity `{}` ({}): {:.1e}, and at most {:.1e} is rounding",
@@ -491,5 +491,5 @@ pub fn accept_imported(imported: &Imported) -> Result<()> {
             Diagnostic::new(Code::ForeignUnsound, message)
         })
         .collect();
-    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+    if diagnostics.is_empty() { Ok(()) } else { Err(Error::new(diagnostics)) }
 }

@@ -150,8 +150,8 @@ struct Reading<'f> {
 impl<'f> Reading<'f> {
     /// Returns FB327 at a line.
     fn wrong(&self, line: usize, message: impl Into<String>, help: &str) -> Vec<Diagnostic> {
-        let found = Diagnostic::new(Code::FeResultsSyntax, message).in_file(self.file.path());
-        vec![found.at_line(line).with_help(help)]
+        let diagnostic = Diagnostic::new(Code::FeResultsSyntax, message).in_file(self.file.path());
+        vec![diagnostic.at_line(line).with_help(help)]
     }
 
     /// Takes a line of a heading, `$NAME` or `$NAME = value`.

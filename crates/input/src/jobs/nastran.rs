@@ -176,17 +176,17 @@ pub(crate) fn elements_of_bulk(path: &Path) -> Diagnosed<DescribedElements> {
 
 /// Returns warnings and notes about the deck.
 fn deck_notes(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     if bulk.has_elements && !bulk.coupled_mass {
         let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";
-        found.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
+        diagnostics.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
     }
     if let Some((path, line, count)) = &bulk.supports {
         let message = match count {
             1 => "a card supports the body".to_owned(),
             _ => format!("{count} cards support the body"),
         };
-        found.push(Diagnostic::new(Code::DeckSupports, message).in_file(path).at_line(*line));
+        diagnostics.push(Diagnostic::new(Code::DeckSupports, message).in_file(path).at_line(*line));
     }
-    found
+    diagnostics
 }

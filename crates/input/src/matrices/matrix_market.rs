@@ -248,10 +248,10 @@ fn banner(line: &[u8]) -> Diagnosed<(bool, Symmetry)> {
         let message = format!("first line is `{shown}`, expected five words");
         return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(1)]);
     };
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     let mut refuse = |what: &str, word: &str, expected: &str, help: &str| {
         let message = format!("{what} is `{word}`, expected {expected}");
-        found.push(Diagnostic::new(Code::MatrixKind, message).at_line(1).with_help(help));
+        diagnostics.push(Diagnostic::new(Code::MatrixKind, message).at_line(1).with_help(help));
     };
     if object != "matrix" {
         refuse("object", object, "`matrix`", "write the matrix");
@@ -289,7 +289,7 @@ fn banner(line: &[u8]) -> Diagnosed<(bool, Symmetry)> {
             Symmetry::General
         }
     };
-    if found.is_empty() { Ok((integer, kind)) } else { Err(found) }
+    if diagnostics.is_empty() { Ok((integer, kind)) } else { Err(diagnostics) }
 }
 
 // Matrix Market arrays: dense, column by column.
@@ -336,14 +336,14 @@ fn check_array_banner(line: &[u8]) -> Diagnosed<()> {
         ("symmetry", &["general"], "write all values"),
     ];
     let wrong = expected.iter().zip(&kinds[1..]).filter(|((_, allowed, _), word)| !allowed.contains(word));
-    let found: Vec<Diagnostic> = wrong
+    let diagnostics: Vec<Diagnostic> = wrong
         .map(|((what, allowed, help), word)| {
             let message =
                 format!("{what} is `{}`, expected `{}`", word.escape_default(), allowed.join("` or `"));
             Diagnostic::new(Code::MatrixKind, message).at_line(1).with_help(*help)
         })
         .collect();
-    if found.is_empty() { Ok(()) } else { Err(found) }
+    if diagnostics.is_empty() { Ok(()) } else { Err(diagnostics) }
 }
 
 /// State of reading below the first line.

@@ -27,11 +27,11 @@ pub(super) fn read_operator(file: &InputFile, name: Option<&str>) -> Diagnosed<O
 }
 
 /// Returns the diagnostics with the file, where they name none.
-fn in_file(found: Vec<Diagnostic>, file: &InputFile) -> Vec<Diagnostic> {
+fn in_file(diagnostics: Vec<Diagnostic>, file: &InputFile) -> Vec<Diagnostic> {
     let located = |diagnostic: Diagnostic| {
         if diagnostic.file().is_none() { diagnostic.in_file(file.path()) } else { diagnostic }
     };
-    found.into_iter().map(located).collect()
+    diagnostics.into_iter().map(located).collect()
 }
 
 /// Reads one value per row.
@@ -63,13 +63,13 @@ fn read_vector(file: &InputFile, dataset: Option<&str>, misfit: (Code, &str)) ->
 }
 
 /// Names the formats of operators in the help about a file of unknown format.
-fn with_formats(found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+fn with_formats(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
     let help = "give the operator in a format of stiffness matrices (Matrix Market, scipy.sparse.save_npz, HDF5, MATLAB, PETSc, OUTPUT4, DMIG) or as a NumPy array (.npy)";
     let named = |diagnostic: Diagnostic| match diagnostic.code() {
         Code::FileFormatUnknown => diagnostic.with_help(help),
         _ => diagnostic,
     };
-    found.into_iter().map(named).collect()
+    diagnostics.into_iter().map(named).collect()
 }
 
 /// Returns the transpose of a dense array without its zeros.

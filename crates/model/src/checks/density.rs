@@ -221,7 +221,7 @@ pub(crate) fn check_density(
     body: &Assembled,
     densities: Option<Densities>,
     local: &LocalMass,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<f64> {
     let units = &body.data.description.units;
     let Densities { quartiles, nodes } = densities?;
@@ -240,7 +240,7 @@ pub(crate) fn check_density(
         units.mass.name()
     );
     if body.origin.allow_implausible || !body.has_units() {
-        found.push(Diagnostic::new(Code::InertiaImplausible, message));
+        diagnostics.push(Diagnostic::new(Code::InertiaImplausible, message));
         return None;
     }
     let mut diagnostic = Diagnostic::new(Code::DensityImplausible, message);
@@ -253,7 +253,7 @@ pub(crate) fn check_density(
             "check the units of the manifest and of the coordinates: the numbers fit materials in {fitting}; use --allow-implausible (or allow_implausible in [model]) if the density is intended"
         ));
     }
-    found.push(diagnostic);
+    diagnostics.push(diagnostic);
     None
 }
 
@@ -410,7 +410,11 @@ impl LocalMass {
 }
 
 /// Adds a warning for masses that belong to another node; returns the number of pairs.
-pub(crate) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut Vec<Diagnostic>) -> usize {
+pub(crate) fn check_exchanged(
+    body: &Assembled,
+    local: &LocalMass,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> usize {
     let pairs = local.exchanged(body);
     if pairs.is_empty() {
         return 0;
@@ -421,7 +425,7 @@ pub(crate) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
         "masses of nodes of the same elements fit their stiffness only when exchanged: {}",
         name_some(&named)
     );
-    found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.origin.mass.path));
+    diagnostics.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.origin.mass.path));
     pairs.len()
 }
 
@@ -432,7 +436,7 @@ pub(crate) fn check_speed(
     body: &Assembled,
     local: &LocalMass,
     density: Option<f64>,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let units = &body.data.description.units;
     let Some(speeds) = local.sound_speed(body.rows.dimension).filter(|_| body.has_units()) else {
@@ -446,7 +450,7 @@ pub(crate) fn check_speed(
     let metal =
         density.and_then(|density| metal_in_other_units(body, density, speeds.median, is_implausible));
     if let Some(diagnostic) = metal {
-        found.push(diagnostic);
+        diagnostics.push(diagnostic);
     } else if is_implausible {
         let matter = heavy.map_or(String::new(), |density| format!(" in a material of {density:.0} kg/m^3"));
         let message = format!(
@@ -457,8 +461,9 @@ pub(crate) fn check_speed(
             None => units_of_speed(speeds.median).join(", or in "),
         };
         let unstated = !units.stated && !body.origin.allow_implausible && !fitting.is_empty();
-        found.push(
-            if unstated && !found.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible) {
+        diagnostics.push(
+            if unstated && !diagnostics.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible)
+            {
                 Diagnostic::new(
                     Code::DensityImplausible,
                     format!("{message}, with numbers in m, kg, s, assumed since no units are given"),

@@ -68,7 +68,7 @@ fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize)
 pub(crate) fn check_mass_pairs(
     body: &Assembled,
     own_mass: Option<&SymmetricMatrix>,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> [usize; 2] {
     let Assembled { origin, nodes, rows, stiffness, .. } = body;
     let mass = own_mass.unwrap_or(&body.mass);
@@ -89,17 +89,17 @@ pub(crate) fn check_mass_pairs(
     );
     let report = |code| Diagnostic::new(code, message.as_str()).in_file(&origin.mass.path);
     if origin.allow_implausible {
-        found.push(report(Code::MassPairs));
+        diagnostics.push(report(Code::MassPairs));
     } else if let Some(order) = other_order(body) {
-        found.push(report(Code::MassOrder).with_help(order));
+        diagnostics.push(report(Code::MassOrder).with_help(order));
     } else if are_mass_elements(mass, rows, count, &foreign) {
         let help = "nothing to do if the model has a mass element or a mass spread over nodes: each of these nodes shares mass with each other";
-        found.push(report(Code::MassPairs).with_help(help));
-    } else if found.iter().any(|note| note.code() == Code::DeckConstrained) {
+        diagnostics.push(report(Code::MassPairs).with_help(help));
+    } else if diagnostics.iter().any(|note| note.code() == Code::DeckConstrained) {
         let help = "give the points with mass that follow others (RBE3, MPC) rows of their own, tied by RBE2 or stiff beams: the mass of a dependent point lies on all points that it follows, and the part of it that rotations of the point move does not turn with these points; --allow-implausible (or allow_implausible in [model]) accepts errors of W2 and W3 by it";
-        found.push(report(Code::MassOrder).with_help(help));
+        diagnostics.push(report(Code::MassOrder).with_help(help));
     } else {
-        found.push(report(Code::MassOrder));
+        diagnostics.push(report(Code::MassOrder));
     }
     [count, foreign.len()]
 }

@@ -21,7 +21,7 @@ pub(crate) fn check_rigid_motion(
     body: &Assembled,
     rounded: f64,
     limit: f64,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> f64 {
     let Assembled { origin, nodes, rows, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);
@@ -47,7 +47,7 @@ pub(crate) fn check_rigid_motion(
                 "write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]: at these nodes K resists rotations but not translations, so that it contains the stress of a preload (pretension of a member, contact, pressure)"
             }
             (None, Some(ground)) if strained.len() * 2 < residuals.len() => {
-                found.push(ground);
+                diagnostics.push(ground);
                 return worst;
             }
             (None, None) if strained.len() * 2 < residuals.len() => {
@@ -58,14 +58,14 @@ pub(crate) fn check_rigid_motion(
             }
         };
         let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
-        found.push(diagnostic.in_file(&origin.stiffness.path).with_help(help));
+        diagnostics.push(diagnostic.in_file(&origin.stiffness.path).with_help(help));
     } else if ground.is_some() {
-        found.extend(ground);
+        diagnostics.extend(ground);
     } else if worst > rounded {
         let message = format!(
             "|K R| reaches {worst:.1e} of the row sum of |K|: node positions fit the stiffness to about this part of the size of the body"
         );
-        found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&origin.nodes_path));
+        diagnostics.push(Diagnostic::new(Code::NodesRounded, message).in_file(&origin.nodes_path));
     }
     worst
 }
@@ -187,7 +187,7 @@ impl<'a> Readings<'a> {
 
 /// Checks that a mass that does not commute with rotations gives rigid motion the inertia of a rigid body:
 /// R'MR = \[m I, -c~; c~, I0\].
-pub(crate) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Diagnostic>) {
+pub(crate) fn check_inertia(body: &Assembled, tolerance: f64, diagnostics: &mut Vec<Diagnostic>) {
     let Assembled { origin, nodes, rows, mass, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);
     let rigid = rows.rigid_fields(&nodes.positions, centre, length);
@@ -195,7 +195,7 @@ pub(crate) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Di
     let g = gram(rigid.as_ref(), Pencil::new(stiffness, mass, 1).apply_mass(rigid.as_ref()).as_ref());
     let m = (0..d).map(|k| g[(k, k)]).sum::<f64>() / d as f64;
     let mut refuse = |message: String| {
-        found.push(Diagnostic::new(Code::MassDirectional, message).in_file(&origin.mass.path));
+        diagnostics.push(Diagnostic::new(Code::MassDirectional, message).in_file(&origin.mass.path));
     };
     let directional = (0..d).flat_map(|k| (0..d).map(move |l| (k, l)));
     let spread =

@@ -68,17 +68,17 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
 fn separate(whole: Assembled) -> Diagnosed<Vec<Assembled>> {
     let component = whole.rows.components(&[&whole.stiffness, &whole.mass]);
     let members = whole.rows.separated(&component);
-    let mut found = Vec::new();
-    found.extend(too_small(&whole, &component, &members));
-    let interfaces = distribute(&whole.data.interfaces, &component, &whole.nodes, &mut found);
-    check_couplings(&whole, &component, &mut found);
-    check_loads_of_others(&whole, &component, &interfaces, &mut found);
+    let mut diagnostics = Vec::new();
+    diagnostics.extend(too_small(&whole, &component, &members));
+    let interfaces = distribute(&whole.data.interfaces, &component, &whole.nodes, &mut diagnostics);
+    check_couplings(&whole, &component, &mut diagnostics);
+    check_loads_of_others(&whole, &component, &interfaces, &mut diagnostics);
     let body: HashMap<i64, usize> = whole.nodes.ids.iter().copied().zip(component.iter().copied()).collect();
     let of_row = |row: usize| component[whole.rows.vertex(row)];
-    refuse_loads_of_several_bodies(&whole.data.named_loads, of_row, &mut found);
-    refuse_several_bodies(&whole.data.recoveries, of_row, |id| body.get(&id).copied(), &mut found);
-    if found.iter().any(|d| d.severity() == Severity::Error) {
-        return Err(found);
+    refuse_loads_of_several_bodies(&whole.data.named_loads, of_row, &mut diagnostics);
+    refuse_several_bodies(&whole.data.recoveries, of_row, |id| body.get(&id).copied(), &mut diagnostics);
+    if diagnostics.iter().any(|d| d.severity() == Severity::Error) {
+        return Err(diagnostics);
     }
     let nodes = nodes_of_bodies(&whole.nodes, &component, members.len());
     let count = members.len();
@@ -111,7 +111,7 @@ fn too_small(whole: &Assembled, component: &[usize], members: &[(Vec<usize>, Row
 }
 
 /// Adds errors about damping and geometric stiffness that couple bodies.
-fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagnostic>) {
+fn check_couplings(whole: &Assembled, component: &[usize], diagnostics: &mut Vec<Diagnostic>) {
     let damping = whole.data.damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
     let geometric = whole
         .data
@@ -119,7 +119,7 @@ fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagn
         .iter()
         .map(|g| (&g.matrix, format!("geometric stiffness for {}", g.load)));
     for (matrix, name) in damping.into_iter().chain(geometric) {
-        found.extend(coupling(matrix, &name, component, &whole.rows, &whole.nodes));
+        diagnostics.extend(coupling(matrix, &name, component, &whole.rows, &whole.nodes));
     }
 }
 
@@ -129,7 +129,7 @@ fn check_loads_of_others(
     whole: &Assembled,
     component: &[usize],
     interfaces: &[Vec<NodeSet>],
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let Assembled { data, nodes, rows, .. } = whole;
     let body_of = |row: usize| component[rows.vertex(row)];
@@ -143,7 +143,7 @@ fn check_loads_of_others(
             let message = format!(
                 "geometric stiffness for {load} has entries at node {node} of body {other}, the interface belongs to body {body}"
             );
-            found.push(Diagnostic::new(Code::BodiesCoupled, message));
+            diagnostics.push(Diagnostic::new(Code::BodiesCoupled, message));
         }
     }
 }
@@ -216,7 +216,7 @@ fn distribute(
     interfaces: &[NodeSet],
     component: &[usize],
     nodes: &Nodes,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<Vec<NodeSet>> {
     let body: HashMap<i64, usize> = nodes.ids.iter().copied().zip(component.iter().copied()).collect();
     let mut sets_of_body = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
@@ -234,7 +234,7 @@ fn distribute(
                 bodies.len(),
                 name_some(&named)
             );
-            found.push(Diagnostic::new(Code::InterfaceAcross, message));
+            diagnostics.push(Diagnostic::new(Code::InterfaceAcross, message));
         } else if let Some((&b, _)) = first.first_key_value() {
             sets_of_body[b].push(set.clone());
         }

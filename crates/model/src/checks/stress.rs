@@ -35,7 +35,7 @@ pub(crate) fn check_stress(
     model: &FeModel,
     files: &[GeometricStiffness<MatrixOrigin>],
     solid: bool,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let given = model.geometric_stiffness();
     if given.is_empty() {
@@ -49,7 +49,7 @@ pub(crate) fn check_stress(
         let judged = Judged { model, load, relations };
         let diagnostic = judged.softening(matrix).or_else(|| judged.motion()).or_else(|| judged.load(&loads));
         let path = file.map_or(Path::new(""), |file| &file.path);
-        found.extend(diagnostic.map(|diagnostic| diagnostic.in_file(path)));
+        diagnostics.extend(diagnostic.map(|diagnostic| diagnostic.in_file(path)));
     }
 }
 

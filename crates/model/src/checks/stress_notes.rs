@@ -11,15 +11,15 @@ const TENSOR: usize = 3;
 
 /// Adds a note for each recovery with plane states, and for each whose rows look like tensors of which no equivalent stress is
 /// formed.
-pub(crate) fn note_stress_points(model: &FeModel, found: &mut Vec<Diagnostic>) {
+pub(crate) fn note_stress_points(model: &FeModel, diagnostics: &mut Vec<Diagnostic>) {
     for recovery in model.recoveries() {
         let labels = match &recovery.operator {
             RecoveryOperator::Rows { labels, .. } | RecoveryOperator::Shapes { labels, .. } => labels,
             RecoveryOperator::Cut { .. } => continue,
         };
         let points = StressPoint::among(labels);
-        found.extend(note_of_plane_states(recovery, &points));
-        found.extend(note_of_tensors(recovery, labels, &points));
+        diagnostics.extend(note_of_plane_states(recovery, &points));
+        diagnostics.extend(note_of_tensors(recovery, labels, &points));
     }
 }
 

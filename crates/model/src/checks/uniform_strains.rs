@@ -49,7 +49,7 @@ pub(crate) fn check_stresses(
     model: &FeModel,
     density: Option<f64>,
     allowed: bool,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let mut strained = None;
     for recovery in model.recoveries() {
@@ -72,7 +72,7 @@ pub(crate) fn check_stresses(
                 strained.outcome(model, &recovery.operator, &points)
             }
         };
-        found.extend(finding(recovery, compared, allowed));
+        diagnostics.extend(finding(recovery, compared, allowed));
     }
 }
 

@@ -84,57 +84,57 @@ pub(crate) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
 }
 
 /// Checks the matrices before their rows are known, and the numbers beside them.
-fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
-    check_matrix(&raw.stiffness, "stiffness", found);
-    check_matrix(&raw.mass, "mass", found);
+fn check_as_read(raw: &RawModel, diagnostics: &mut Vec<Diagnostic>) {
+    check_matrix(&raw.stiffness, "stiffness", diagnostics);
+    check_matrix(&raw.mass, "mass", diagnostics);
     let (nk, nm) = (raw.stiffness.matrix.n_cols(), raw.mass.matrix.n_cols());
     if nk != nm {
         let message = format!("stiffness matrix has {nk} rows, mass matrix {nm}");
-        found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&raw.mass.path));
+        diagnostics.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&raw.mass.path));
     }
     if !(2..=3).contains(&raw.dimension) {
         let message = format!("`dimension` is {}, expected 2 or 3", raw.dimension);
-        found.push(Diagnostic::new(Code::ManifestSyntax, message));
+        diagnostics.push(Diagnostic::new(Code::ManifestSyntax, message));
     }
     if let Some(problem) = raw.data.damping.as_ref().and_then(Damping::problem) {
-        found.push(Diagnostic::new(Code::ManifestSyntax, problem));
+        diagnostics.push(Diagnostic::new(Code::ManifestSyntax, problem));
     }
     let damping = raw.data.damping.as_ref().and_then(Damping::matrix).map(|matrix| (matrix, "damping"));
     let geometric =
         raw.data.geometric_stiffness.iter().map(|stiffness| (&stiffness.matrix, GEOMETRIC_STIFFNESS));
     for (other, name) in damping.into_iter().chain(geometric) {
-        check_matrix(other, name, found);
+        check_matrix(other, name, diagnostics);
         let rows = other.matrix.n_cols();
         if rows != nk {
             let message = format!("stiffness matrix has {nk} rows, {name} matrix {rows}");
-            found.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&other.path));
+            diagnostics.push(Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(&other.path));
         }
     }
 }
 
 /// Checks the tables for the `nodes` that have rows: positions, interfaces with their reference points,
 /// loads.
-fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
-    check_places(raw, nodes, found);
-    check_names(raw, found);
-    resolve_references(raw, nodes, found);
-    check_members(raw, nodes, found);
+fn check_tables(raw: &mut RawModel, nodes: &Nodes, diagnostics: &mut Vec<Diagnostic>) {
+    check_places(raw, nodes, diagnostics);
+    check_names(raw, diagnostics);
+    resolve_references(raw, nodes, diagnostics);
+    check_members(raw, nodes, diagnostics);
     let dimension = usize::from(raw.dimension);
-    check_loads(&raw.data.geometric_stiffness, &raw.data.interfaces, dimension, found);
+    check_loads(&raw.data.geometric_stiffness, &raw.data.interfaces, dimension, diagnostics);
     let rows = raw.stiffness.matrix.n_cols();
     if rows <= rigid_count(dimension) {
         let message = format!("model has {rows} degrees of freedom");
-        found.push(Diagnostic::new(Code::ModelTooSmall, message));
+        diagnostics.push(Diagnostic::new(Code::ModelTooSmall, message));
     }
 }
 
 /// Returns the surface on the `nodes` that have rows; adds a diagnostic about triangles that are lost with
 /// other nodes, since they leave holes.
-fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) -> Option<SurfaceMesh> {
+fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, diagnostics: &mut Vec<Diagnostic>) -> Option<SurfaceMesh> {
     let mesh = raw.data.mesh.take()?;
     if mesh.least_nodes() > raw.nodes.len() {
         let message = format!("mesh has {} nodes, the node table {}", mesh.least_nodes(), raw.nodes.len());
-        found.push(Diagnostic::new(Code::MeshForeign, message));
+        diagnostics.push(Diagnostic::new(Code::MeshForeign, message));
         return None;
     }
     let used = mesh.among(&raw.nodes.ids, &nodes.ids);
@@ -145,25 +145,25 @@ fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
             "{} of {all} triangles have nodes without degrees of freedom: they are not drawn",
             all - left
         );
-        found.push(Diagnostic::new(Code::MeshPartial, message));
+        diagnostics.push(Diagnostic::new(Code::MeshPartial, message));
     }
     used
 }
 
 /// Checks that coordinates are finite, and that those of a plane model lie in its plane.
-fn check_places(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
+fn check_places(raw: &RawModel, nodes: &Nodes, diagnostics: &mut Vec<Diagnostic>) {
     if nodes.positions.iter().flatten().any(|x| !x.is_finite()) {
         let message = "a node coordinate is not a finite number";
-        found.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
+        diagnostics.push(Diagnostic::new(Code::CoordinateNotFinite, message).in_file(&raw.nodes_path));
     }
     if let Some(i) = nodes.positions.iter().position(|x| raw.dimension == 2 && x[2] != 0.0) {
         let message = format!("node {} of a plane model has z = {}", nodes.ids[i], nodes.positions[i][2]);
-        found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
+        diagnostics.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.nodes_path));
     }
 }
 
 /// Checks that interfaces refer to nodes that have rows.
-fn check_members(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
+fn check_members(raw: &RawModel, nodes: &Nodes, diagnostics: &mut Vec<Diagnostic>) {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     let placed: HashSet<i64> = raw.nodes.ids.iter().copied().collect();
     for set in &raw.data.interfaces {
@@ -173,7 +173,7 @@ fn check_members(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
             if !members.is_empty() {
                 let (count, named) = (members.len(), name_some(&members));
                 let message = format!("interface `{}` names {count} {what}: {named}", set.name);
-                found.push(Diagnostic::new(Code::InterfaceNode, message));
+                diagnostics.push(Diagnostic::new(Code::InterfaceNode, message));
             }
         }
     }
@@ -252,7 +252,7 @@ impl InternalOrder<'_> {
 }
 
 /// Checks for names that no file can hold, before a long run instead of after it.
-fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
+fn check_names(raw: &RawModel, diagnostics: &mut Vec<Diagnostic>) {
     let mut seen = HashSet::new();
     for set in &raw.data.interfaces {
         let name = &set.name;
@@ -266,25 +266,25 @@ fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
             _ if set.nodes.is_empty() => Some(format!("interface `{name}` has no nodes")),
             _ => None,
         };
-        found.extend(wrong.map(|message| Diagnostic::new(Code::ManifestSyntax, message)));
+        diagnostics.extend(wrong.map(|message| Diagnostic::new(Code::ManifestSyntax, message)));
     }
     for (field, _) in raw.data.description.texts().iter().filter(|(_, text)| text.contains('\0')) {
         let message = format!("the model {field} has a NUL character in it");
-        found.push(Diagnostic::new(Code::ManifestSyntax, message));
+        diagnostics.push(Diagnostic::new(Code::ManifestSyntax, message));
     }
 }
 
 // Conditions on each matrix by itself: finite, symmetric to rounding, no negative diagonal entry.
 
 /// Adds an error for a matrix that is not square, empty, or not finite.
-fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
+fn check_matrix(raw: &RawMatrix, name: &str, diagnostics: &mut Vec<Diagnostic>) {
     let matrix = &raw.matrix;
     if matrix.n_rows() != matrix.n_cols() {
         let message = format!("{name} matrix has {} rows and {} columns", matrix.n_rows(), matrix.n_cols());
-        found.push(Diagnostic::new(Code::MatrixNotSquare, message).in_file(&raw.path));
+        diagnostics.push(Diagnostic::new(Code::MatrixNotSquare, message).in_file(&raw.path));
     } else if matrix.nnz() == 0 {
         let message = format!("{name} matrix has no nonzero entries");
-        found.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
+        diagnostics.push(Diagnostic::new(Code::MatrixEmpty, message).in_file(&raw.path));
     }
     let not_finite = |values: &[f64]| values.iter().any(|v| !v.is_finite());
     if parallel::any(matrix.values().chunks(1 << 16), not_finite) {
@@ -295,7 +295,7 @@ fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
             matrix.values()[at],
             matrix.row_idx()[at] + 1
         );
-        found.push(Diagnostic::new(Code::MatrixNotFinite, message).in_file(&raw.path));
+        diagnostics.push(Diagnostic::new(Code::MatrixNotFinite, message).in_file(&raw.path));
     }
 }
 
@@ -306,7 +306,7 @@ fn symmetric(
     layout: &Layout,
     name: &str,
     label: impl Fn(usize) -> DofLabel,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<SymmetricMatrix> {
     let matrix = std::mem::take(&mut raw.matrix);
     let ordered = if layout.is_identity() { matrix } else { matrix.permuted(&layout.row_to_internal) };
@@ -329,7 +329,7 @@ fn symmetric(
         if one_sided * 2 >= ordered.nnz().saturating_sub(n) * 2 && one_sided > 0 {
             diagnostic = diagnostic.with_help("declare the matrix symmetric: only one triangle is stored");
         }
-        found.push(diagnostic);
+        diagnostics.push(diagnostic);
         return None;
     }
     Some(SymmetricMatrix::symmetrised(ordered))
@@ -385,13 +385,13 @@ fn check_empty_rows(
     matrices: [&SymmetricMatrix; 2],
     label: impl Fn(usize) -> DofLabel,
     raw: &RawModel,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let is_empty = |&row: &usize| matrices.iter().all(|matrix| matrix.row(row).0.is_empty());
     let both: Vec<DofLabel> = (0..matrices[0].n()).filter(is_empty).map(label).collect();
     if !both.is_empty() {
         let message = format!("{} rows are empty in both matrices: {}", both.len(), name_some(&both));
-        found.push(Diagnostic::new(Code::PencilSingular, message).in_file(&raw.stiffness.path));
+        diagnostics.push(Diagnostic::new(Code::PencilSingular, message).in_file(&raw.stiffness.path));
     }
 }
 
@@ -400,7 +400,7 @@ fn check_diagonal(
     name: &str,
     path: &Path,
     label: impl Fn(usize) -> DofLabel,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) {
     let negative: Vec<DofLabel> =
         matrix.diagonal().iter().enumerate().filter(|(_, d)| **d < 0.0).map(|(i, _)| label(i)).collect();
@@ -410,7 +410,7 @@ fn check_diagonal(
             negative.len(),
             name_some(&negative)
         );
-        found.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
+        diagnostics.push(Diagnostic::new(Code::DiagonalNegative, message).in_file(path));
     }
 }
 

@@ -40,42 +40,42 @@ impl Layout {
 const MISSING_ROW: u32 = u32::MAX;
 
 /// Assigns the rows to nodes and directions; all errors are collected in `found`.
-pub(crate) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layout> {
-    let labels = labels(raw, found)?;
-    let before = found.len();
-    let index = index_of_nodes(raw, found);
-    check_plane(raw, &labels, found);
-    if found.len() > before {
+pub(crate) fn layout(raw: &RawModel, diagnostics: &mut Vec<Diagnostic>) -> Option<Layout> {
+    let labels = labels(raw, diagnostics)?;
+    let before = diagnostics.len();
+    let index = index_of_nodes(raw, diagnostics);
+    check_plane(raw, &labels, diagnostics);
+    if diagnostics.len() > before {
         return None;
     }
-    let mut rows = RowsOfNodes::new(raw, &labels, &index, found);
+    let mut rows = RowsOfNodes::new(raw, &labels, &index, diagnostics);
     let empty = rows.leave_out_empty(raw);
-    let occupied = Occupied::new(raw, &rows.placed, found);
-    if found.len() > before {
+    let occupied = Occupied::new(raw, &rows.placed, diagnostics);
+    if diagnostics.len() > before {
         return None;
     }
-    found.extend(empty.note(raw));
-    occupied.note_unused(raw, &empty.nodes, found);
-    let placeless = sort_without_place(raw, &rows.without_place, occupied.used.is_empty(), found)?;
+    diagnostics.extend(empty.note(raw));
+    occupied.note_unused(raw, &empty.nodes, diagnostics);
+    let placeless = sort_without_place(raw, &rows.without_place, occupied.used.is_empty(), diagnostics)?;
     Some(in_order(raw, &rows.placed, occupied.used, placeless))
 }
 
 /// Returns the label of each row, implied if none are given; `None` with a diagnostic if the number of
 /// labels is not that of rows.
-fn labels<'r>(raw: &'r RawModel, found: &mut Vec<Diagnostic>) -> Option<Cow<'r, [DofLabel]>> {
+fn labels<'r>(raw: &'r RawModel, diagnostics: &mut Vec<Diagnostic>) -> Option<Cow<'r, [DofLabel]>> {
     let n = raw.stiffness.matrix.n_cols();
-    let Some(labels) = &raw.dofs else { return implied_labels(raw, n, found).map(Cow::Owned) };
+    let Some(labels) = &raw.dofs else { return implied_labels(raw, n, diagnostics).map(Cow::Owned) };
     if labels.len() != n {
         let message =
             format!("{} degrees of freedom are labelled, but the matrices have {n} rows", labels.len());
-        found.push(Diagnostic::new(Code::DofCount, message).in_file(&raw.dofs_path));
+        diagnostics.push(Diagnostic::new(Code::DofCount, message).in_file(&raw.dofs_path));
         return None;
     }
     Some(Cow::Borrowed(labels))
 }
 
 /// Returns the labels of the displacements of each node in turn.
-fn implied_labels(raw: &RawModel, n: usize, found: &mut Vec<Diagnostic>) -> Option<Vec<DofLabel>> {
+fn implied_labels(raw: &RawModel, n: usize, diagnostics: &mut Vec<Diagnostic>) -> Option<Vec<DofLabel>> {
     let (nodes, dimension) = (raw.nodes.len(), usize::from(raw.dimension));
     if dimension * nodes == n {
         let displacements =
@@ -93,24 +93,24 @@ fn implied_labels(raw: &RawModel, n: usize, found: &mut Vec<Diagnostic>) -> Opti
         "give a dofs table that says which node and direction each matrix row is".to_owned()
     };
     let diagnostic = Diagnostic::new(Code::DofCount, message).in_file(&raw.nodes_path);
-    found.push(diagnostic.with_help(help));
+    diagnostics.push(diagnostic.with_help(help));
     None
 }
 
 /// Returns the index of each node in the node table by its number; adds a diagnostic for each duplicate.
-fn index_of_nodes(raw: &RawModel, found: &mut Vec<Diagnostic>) -> HashMap<i64, usize> {
+fn index_of_nodes(raw: &RawModel, diagnostics: &mut Vec<Diagnostic>) -> HashMap<i64, usize> {
     let mut index = HashMap::with_capacity(raw.nodes.len());
     for (i, &id) in raw.nodes.ids.iter().enumerate() {
         if index.insert(id, i).is_some() {
             let message = format!("node {id} is given twice");
-            found.push(Diagnostic::new(Code::NodeDuplicate, message).in_file(&raw.nodes_path));
+            diagnostics.push(Diagnostic::new(Code::NodeDuplicate, message).in_file(&raw.nodes_path));
         }
     }
     index
 }
 
 /// Adds a diagnostic about directions of a plane model that leave its plane.
-fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>) {
+fn check_plane(raw: &RawModel, labels: &[DofLabel], diagnostics: &mut Vec<Diagnostic>) {
     let leads_out = |label: &&DofLabel| raw.dimension == 2 && (3..=5).contains(&label.direction);
     let outside: Vec<DofLabel> = labels.iter().filter(leads_out).copied().collect();
     if !outside.is_empty() {
@@ -119,7 +119,7 @@ fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>)
             outside.len(),
             name_some(&outside)
         );
-        found.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.dofs_path));
+        diagnostics.push(Diagnostic::new(Code::DirectionOutOfPlane, message).in_file(&raw.dofs_path));
     }
 }
 
@@ -137,7 +137,7 @@ impl RowsOfNodes {
         raw: &RawModel,
         labels: &[DofLabel],
         index: &HashMap<i64, usize>,
-        found: &mut Vec<Diagnostic>,
+        diagnostics: &mut Vec<Diagnostic>,
     ) -> Self {
         // Look up in parallel: there are several labels per node.
         let places: Vec<Option<usize>> = parallel::concat(labels.len(), 1024, |rows| {
@@ -167,7 +167,7 @@ impl RowsOfNodes {
         }
         if !twice.is_empty() {
             let message = format!("{} labels are given twice: {}", twice.len(), name_some(&twice));
-            found.push(Diagnostic::new(Code::DofDuplicate, message).in_file(&raw.dofs_path));
+            diagnostics.push(Diagnostic::new(Code::DofDuplicate, message).in_file(&raw.dofs_path));
         }
         all
     }
@@ -296,7 +296,7 @@ struct Occupied {
 
 impl Occupied {
     /// Sorts the nodes; adds a diagnostic about nodes with only some displacements.
-    fn new(raw: &RawModel, placed: &[[u32; 6]], found: &mut Vec<Diagnostic>) -> Self {
+    fn new(raw: &RawModel, placed: &[[u32; 6]], diagnostics: &mut Vec<Diagnostic>) -> Self {
         let dimension = usize::from(raw.dimension);
         let mut sorted = Self { used: Vec::new(), unused: Vec::new() };
         let mut incomplete = Vec::new();
@@ -318,14 +318,14 @@ impl Occupied {
             if sorted.used.is_empty() && incomplete.iter().all(|label| label.direction == 3) {
                 diagnostic = diagnostic.with_help("for a plane model, set `dimension = 2` (--dimension 2)");
             }
-            found.push(diagnostic);
+            diagnostics.push(diagnostic);
         }
         sorted
     }
 
     /// Adds a note about nodes that are left out, except those whose rows a note already reports (`reported`) and points
     /// with mass that follow other nodes.
-    fn note_unused(&self, raw: &RawModel, reported: &[i64], found: &mut Vec<Diagnostic>) {
+    fn note_unused(&self, raw: &RawModel, reported: &[i64], diagnostics: &mut Vec<Diagnostic>) {
         let following = raw.followers.iter().flat_map(|followers| &followers.points.ids);
         let reported: HashSet<i64> = reported.iter().chain(following).copied().collect();
         let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !reported.contains(node)).collect();
@@ -335,7 +335,7 @@ impl Occupied {
                 unused.len(),
                 name_some(&unused)
             );
-            found.push(Diagnostic::new(Code::NodesUnused, message).in_file(&raw.nodes_path));
+            diagnostics.push(Diagnostic::new(Code::NodesUnused, message).in_file(&raw.nodes_path));
         }
     }
 }
@@ -385,7 +385,7 @@ fn sort_without_place(
     raw: &RawModel,
     nodes: &[(i64, [u32; 6])],
     no_other: bool,
-    found: &mut Vec<Diagnostic>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<WithoutPlace> {
     let dimension = usize::from(raw.dimension);
     let massless = |row: u32| raw.mass.matrix.column(row as usize).1.iter().all(|&v| v == 0.0);
@@ -413,7 +413,7 @@ fn sort_without_place(
     }
     missing.sort_unstable();
     let message = format!("{} nodes have no coordinates: {}", missing.len(), name_some(&missing));
-    found.push(Diagnostic::new(Code::NodesMissing, message).in_file(&raw.nodes_path));
+    diagnostics.push(Diagnostic::new(Code::NodesMissing, message).in_file(&raw.nodes_path));
     None
 }
 

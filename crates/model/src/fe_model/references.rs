@@ -25,7 +25,7 @@ const MEAN_POINT_DISTANCE: f64 = 0.05;
 const ROUNDING_LENGTH: f64 = 1e-9;
 
 /// Replaces the definitions of reference points by positions, and adds errors for invalid ones.
-pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut Vec<Diagnostic>) {
+pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, diagnostics: &mut Vec<Diagnostic>) {
     let (centre, size) = centre_and_length(&used.positions);
     let body = Extent { centre, size };
     let index: HashMap<i64, u32> = raw.nodes.ids.iter().copied().zip(0..).collect();
@@ -34,7 +34,7 @@ pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
         let is_free = set.coupling == Some(Coupling::Free);
         if is_free && set.reference.is_stated() {
             let message = format!("interface `{}` is free, but has a reference point", set.name);
-            found.push(Diagnostic::new(Code::ManifestSyntax, message));
+            diagnostics.push(Diagnostic::new(Code::ManifestSyntax, message));
         }
         let places = |ids: &[i64]| ids.iter().filter_map(|id| index.get(id)).copied().collect::<Vec<u32>>();
         let nodes = places(&set.nodes);
@@ -44,7 +44,7 @@ pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 Some(&node) => set.reference = Reference::Point(positions[node as usize]),
                 None => {
                     let message = format!("reference node {id} of interface `{}` is unknown", set.name);
-                    found.push(Diagnostic::new(Code::InterfaceNode, message));
+                    diagnostics.push(Diagnostic::new(Code::InterfaceNode, message));
                 }
             },
             Reference::Centre | Reference::Axis { .. } if !is_free => {
@@ -53,14 +53,14 @@ pub(crate) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 outline.dedup();
                 let members = InterfaceNodes { nodes: &nodes, outline: &outline, positions };
                 let centre = InterfaceCentre::new(&members, raw.data.mesh.as_ref(), &set.reference);
-                found.extend(beside_the_mean(&set.name, &centre, &member_positions, body.size));
+                diagnostics.extend(beside_the_mean(&set.name, &centre, &member_positions, body.size));
                 set.reference = Reference::Default(centre.point);
             }
             _ => {}
         }
         if let Some(x) = set.reference.point() {
             let problem = impossible(&set.name, x, raw.dimension, &body);
-            found.extend(problem.or_else(|| far_reference(&set.name, x, &member_positions, body.size)));
+            diagnostics.extend(problem.or_else(|| far_reference(&set.name, x, &member_positions, body.size)));
         }
     }
 }

@@ -33,7 +33,7 @@ pub struct FramedScene<'a> {
     /// Scene with all vectors along the axes of this frame or of the world.
     pub scene: Cow<'a, Scene>,
     /// Warnings and notes.
-    pub found: Vec<Diagnostic>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl<'a> FramedScene<'a> {
@@ -45,24 +45,28 @@ impl<'a> FramedScene<'a> {
     /// limits of the scene.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         if scene.resolved {
-            return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
+            return Ok(Self {
+                body: Cow::Borrowed(body),
+                scene: Cow::Borrowed(scene),
+                diagnostics: Vec::new(),
+            });
         }
         refuse_beyond_range(scene, &body.frame().axes)?;
         refuse_loaded_preloads(body, scene)?;
-        let (framed_body, mut found) = match &scene.carried {
+        let (framed_body, mut diagnostics) = match &scene.carried {
             Some(carried) => {
                 let carrier = carried.carrier();
                 let carried_body = body.carried(&carrier)?;
-                let mut found = Vec::from_iter(carried_body.unresolved(&carrier, body));
-                found.extend(body.softened(&carrier));
+                let mut diagnostics = Vec::from_iter(carried_body.unresolved(&carrier, body));
+                diagnostics.extend(body.softened(&carrier));
                 let is_stiff = |body: &FlexBody| !body.geometric_stiffness().is_empty();
                 if is_stiff(body) && !is_stiff(&carried_body) {
                     let message = format!(
                         "the geometric stiffness of the body is not used while {carrier} carries it: {carrier} moves in the modes of the body, and the file does not have the geometric stiffness of that motion"
                     );
-                    found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
+                    diagnostics.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
                 }
-                (Cow::Owned(carried_body), found)
+                (Cow::Owned(carried_body), diagnostics)
             }
             None => {
                 refuse_numbered_modes(body, scene)?;
@@ -70,17 +74,17 @@ impl<'a> FramedScene<'a> {
             }
         };
         let mut resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
-        found.extend(idle(&framed_body, &resolved));
+        diagnostics.extend(idle(&framed_body, &resolved));
         if let Some(carrier) = scene.carried.as_ref().map(Carried::carrier) {
             let motion = accelerations(framed_body.frame(), &resolved);
-            found.extend(framed_body.lacks_response(&carrier, body, motion));
+            diagnostics.extend(framed_body.lacks_response(&carrier, body, motion));
         }
-        found.extend(gravity_in_other_units(body.units(), scene));
-        found.extend(released_preloads(body, scene));
+        diagnostics.extend(gravity_in_other_units(body.units(), scene));
+        diagnostics.extend(released_preloads(body, scene));
         let preloads = body.named_loads().iter().filter(|load| load.preload);
         let acting = preloads.map(|load| Load::named(&load.name, History::Constant(1.0)));
         resolved.loads.extend(acting);
-        Ok(Self { body: framed_body, scene: Cow::Owned(resolved), found })
+        Ok(Self { body: framed_body, scene: Cow::Owned(resolved), diagnostics })
     }
 }
 
@@ -247,11 +251,11 @@ fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
 /// the body in the model.
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     let mut refuse =
         |what: &str, key: &str| {
             let message = format!("{what} is beyond `{key}` of [motion]");
-            found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
+            diagnostics.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
                 "raise the value in [motion]: it must cover the rotation that the scene prescribes",
             ));
         };
@@ -298,7 +302,7 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
             }
         }
     }
-    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+    if diagnostics.is_empty() { Ok(()) } else { Err(Error::new(diagnostics)) }
 }
 
 /// Transforms a history `given` along axes that turn with the body to the axes of the ranges in [motion].
@@ -334,10 +338,10 @@ fn is_beyond(range: &Option<Range>, vector: Vector3<f64>) -> bool {
 
 /// Returns warnings about loads without effect.
 fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     let mut tell = |message: String, help: Option<&str>| {
         let diagnostic = Diagnostic::new(Code::LoadIdle, message);
-        found.push(match help {
+        diagnostics.push(match help {
             Some(help) => diagnostic.with_help(help),
             None => diagnostic,
         });
@@ -355,14 +359,14 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
             tell(message, Some("move the load to another place, or remove [carried]"));
         }
     }
-    let Some(gravity) = &scene.gravity else { return found };
+    let Some(gravity) = &scene.gravity else { return diagnostics };
     if *gravity == Vector3::zeros() {
         tell("`gravity` is zero".to_owned(), leave);
     } else if scene.spin.as_ref().is_some_and(|spin| spin.hold) && is_uncoupled(body) {
         let message = "`gravity` deforms nothing: [spin] holds the body by its centre of mass and mean axes, so that all of its mass is supported";
         tell(message.to_owned(), None);
     }
-    found
+    diagnostics
 }
 
 /// Returns true if accelerations of the frame excite no mode.

@@ -58,16 +58,16 @@ fn cases(walk: &mut Walk<'_>, top: &TomlTable<'_>, list: &Value<'_>, stem: Strin
     let names = names(walk, &tables);
     let mut scenes = Vec::new();
     let mut found_by_case = Vec::new();
-    let before = std::mem::take(&mut walk.found);
+    let before = std::mem::take(&mut walk.diagnostics);
     for ((table, _), name) in tables.iter().zip(&names) {
         let full = format!("{}: {name}", whole.as_deref().unwrap_or_default());
         walk.known_keys(table, "[[case]]", &known_keys());
         let read = scene(walk, &merged(top, table), full);
         scenes.extend(read);
-        found_by_case.push(std::mem::take(&mut walk.found));
+        found_by_case.push(std::mem::take(&mut walk.diagnostics));
     }
-    walk.found = before;
-    walk.found.extend(each_once(found_by_case, &names));
+    walk.diagnostics = before;
+    walk.diagnostics.extend(each_once(found_by_case, &names));
     if scenes.len() != tables.len() {
         return None;
     }
@@ -193,7 +193,7 @@ fn refuse_without_run(walk: &mut Walk<'_>, top: &TomlTable<'_>, cases: &[Scene])
     if let (Some(list), true) = (top.get("variation"), cases.iter().all(|scene| scene.run.duration.is_none()))
     {
         let refused = without_run(walk, list.span());
-        walk.found.push(refused);
+        walk.diagnostics.push(refused);
     }
 }
 
@@ -207,7 +207,8 @@ fn refuse_some_without_run(walk: &mut Walk<'_>, scenes: &[Scene], names: &[Strin
         if scene.run.duration.is_none() {
             let message = format!("case `{name}` has no `duration`, but other cases have one");
             let diagnostic = walk.at(Code::SceneContradicts, span.clone(), message);
-            walk.found.push(diagnostic.with_help("give `duration` in [run] of the scene or of every case"));
+            walk.diagnostics
+                .push(diagnostic.with_help("give `duration` in [run] of the scene or of every case"));
         }
     }
 }

@@ -86,7 +86,7 @@ impl HistoryFiles {
                     read.push(SeriesFile { path, source });
                 }
                 Err(changed) => {
-                    walk.found.push(changed);
+                    walk.diagnostics.push(changed);
                     return None;
                 }
             }
@@ -111,7 +111,7 @@ impl HistoryFiles {
         };
         let message = format!("{name} covers the times {first} to {last} of the scene, but {what}");
         let uncovered = walk.at(Code::SeriesRange, span.clone(), message);
-        walk.found.push(uncovered.with_help(help));
+        walk.diagnostics.push(uncovered.with_help(help));
         None
     }
 }
@@ -246,10 +246,10 @@ fn series(
 }
 
 /// Adds diagnostics that are not yet reported: several histories may come from one file.
-pub(super) fn tell(walk: &mut Walk<'_>, found: Vec<Diagnostic>) {
-    for diagnostic in found {
-        if !walk.found.contains(&diagnostic) {
-            walk.found.push(diagnostic);
+pub(super) fn tell(walk: &mut Walk<'_>, diagnostics: Vec<Diagnostic>) {
+    for diagnostic in diagnostics {
+        if !walk.diagnostics.contains(&diagnostic) {
+            walk.diagnostics.push(diagnostic);
         }
     }
 }

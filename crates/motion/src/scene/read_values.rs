@@ -279,7 +279,7 @@ pub(super) fn turning(
             format!("{place} has more than one of {ways}")
         };
         let wrong = walk.at(Code::SceneSyntax, span, message);
-        walk.found.push(wrong.with_help(format!("give one of {ways}")));
+        walk.diagnostics.push(wrong.with_help(format!("give one of {ways}")));
         axis_of(walk, table);
         axes(walk, table, &EVERY, Axes::Model);
         return None;

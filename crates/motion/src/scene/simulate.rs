@@ -106,7 +106,7 @@ fn simulate_recording(
         .as_ref()
         .map_or_else(Vec::new, |motion| stresses_at_rigid_interfaces(body, motion));
     let found = [
-        framed.found,
+        framed.diagnostics,
         left_out,
         unseen.unwrap_or_default(),
         remarks(body, &recording.extremes),

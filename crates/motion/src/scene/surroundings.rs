@@ -25,8 +25,8 @@ impl<'a> SceneForces<'a> {
     /// FB212 for nodes, interfaces and modes that the body does not have, for torques at points without an
     /// orientation, and for vectors that leave the plane of a plane body; one diagnostic per finding.
     pub(super) fn new(body: &FlexBody, scene: &'a Scene) -> Result<(Self, Vec<BodyPoint>)> {
-        let mut found = Vec::new();
-        let mut wrong = |message: String| found.push(Diagnostic::new(Code::SceneBody, message));
+        let mut diagnostics = Vec::new();
+        let mut wrong = |message: String| diagnostics.push(Diagnostic::new(Code::SceneBody, message));
         for start in &scene.initial.modes {
             if start.mode >= body.n_modes() {
                 wrong(format!(
@@ -45,8 +45,8 @@ impl<'a> SceneForces<'a> {
         }
         let terms = scene.run.terms;
         let mut point = |entry: &str, number: usize, place: &Point| {
-            let found = body_point(body, terms, place);
-            found.map_err(|why| wrong(format!("[[{entry}]] {number}: {why}"))).ok()
+            let diagnostics = body_point(body, terms, place);
+            diagnostics.map_err(|why| wrong(format!("[[{entry}]] {number}: {why}"))).ok()
         };
         let watched =
             (1..).zip(&scene.watched).map(|(number, place)| point("watch", number, place)).collect();
@@ -60,11 +60,11 @@ impl<'a> SceneForces<'a> {
             }
         }
         match (watched, loads) {
-            (Some(watched), Some(loads)) if found.is_empty() => {
+            (Some(watched), Some(loads)) if diagnostics.is_empty() => {
                 let driving = Driving::new(body.frame(), scene);
                 Ok((Self { gravity: scene.gravity, loads, driving }, watched))
             }
-            _ => Err(Error::new(found)),
+            _ => Err(Error::new(diagnostics)),
         }
     }
 }

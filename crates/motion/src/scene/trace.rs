@@ -166,7 +166,7 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
     let finished = run.integrate(&[0.0, run.duration], PARTS, look)?;
     // Remarks about motions beyond the range of the model.
     let extremes = survey.extremes(finished.size, finished.least_energy);
-    let found = [framed.found, remarks(body, &extremes)].concat();
+    let found = [framed.diagnostics, remarks(body, &extremes)].concat();
     Ok((tracer.finish(finished, extremes), found))
 }
 

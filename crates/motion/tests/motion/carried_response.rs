@@ -36,7 +36,7 @@ fn missing(body: &FlexBody, head: &str, tail: &str) -> Option<String> {
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("written");
     let scene = LoadCases::read_single(path, None).expect("a scene");
-    let found = FramedScene::new(body, &scene).expect("a carried body").found;
+    let found = FramedScene::new(body, &scene).expect("a carried body").diagnostics;
     found
         .iter()
         .find(|diagnostic| diagnostic.code() == Code::CarrierUnresolved)

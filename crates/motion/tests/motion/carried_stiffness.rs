@@ -317,7 +317,7 @@ fn only_a_body_without_the_stiffness_of_rotations_loses_geometric_stiffness() {
         let scene = carried_scene();
         let framed = FramedScene::new(&body, &scene).expect("a carrier");
         let warned =
-            framed.found.iter().any(|diagnostic| diagnostic.code() == Code::CarriedGeometricStiffness);
+            framed.diagnostics.iter().any(|diagnostic| diagnostic.code() == Code::CarriedGeometricStiffness);
         assert_eq!((warned, framed.body.geometric_stiffness().is_empty()), (is_lost, is_lost));
     }
 }

@@ -22,16 +22,16 @@ use std::f64::consts::TAU;
 pub(super) struct FramedTests<'s> {
     pub body: Cow<'s, FlexBody>,
     pub scene: Cow<'s, Scene>,
-    found: Vec<Diagnostic>,
+    diagnostics: Vec<Diagnostic>,
     scenes: Vec<Scene>,
 }
 
 impl<'s> FramedTests<'s> {
     pub(super) fn new(body: &'s FlexBody, scene: &'s Scene) -> Result<Self> {
-        let FramedScene { body, scene, found } = FramedScene::new(body, scene)?;
+        let FramedScene { body, scene, diagnostics } = FramedScene::new(body, scene)?;
         let (body, scene) = damped_once(body, scene)?;
         let scenes = scenes(&body, &scene)?;
-        Ok(Self { body, scene, found, scenes })
+        Ok(Self { body, scene, diagnostics, scenes })
     }
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Demand<'c> {
     /// Scenes in which models are tested.
     pub cases: Vec<Case<'c>>,
     /// Warnings and notes about scene and body.
-    pub found: &'c [Diagnostic],
+    pub diagnostics: &'c [Diagnostic],
     /// Trials by bounds.
     pub bounds: Vec<Trial>,
     /// Groups that bounds do not rule out, and the part of the tolerances that their bound takes; `None` if bounds rule out
@@ -80,7 +80,7 @@ impl<'c> Demand<'c> {
             situation: Situation::new(body, scene, &loads),
             loads,
             cases,
-            found: &framed.found,
+            diagnostics: &framed.diagnostics,
             by_bounds: bounds.iter().find(|trial| trial.passed()).map(|trial| (trial.kept, trial.worst)),
             bounds,
             reference_errors: &[],

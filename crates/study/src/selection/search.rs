@@ -43,7 +43,7 @@ impl<'s> SelectionState<'s> {
         let mut diagnostics = Vec::new();
         let mut trials = Vec::new();
         for (at, demand) in demands.iter().enumerate() {
-            diagnostics.extend(demand.found.iter().cloned().map(|said| demand.about(said)));
+            diagnostics.extend(demand.diagnostics.iter().cloned().map(|said| demand.about(said)));
             let warning =
                 demand.reference_errors.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
             let remarks = demand.reference_errors.last().map(|own| own.remarks(demand.scene));
@@ -428,7 +428,7 @@ fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[usize]) -> V
     let (body, scene) = (runs.body, runs.scene);
     let rows = PointRows::new(body);
     let spin = measure.trace().extremes.spin;
-    let mut found = Vec::new();
+    let mut diagnostics = Vec::new();
     for (load, point) in scene.loads.iter().zip(runs.loads) {
         // Seen from the body, a force that is fixed in space turns backwards with the spin.
         let turning = if load.axes == Axes::World { spin } else { 0.0 };
@@ -457,9 +457,9 @@ fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[usize]) -> V
                     load.at,
                     rate / TAU
                 );
-                found.push(Diagnostic::new(Code::ResonanceDropped, message));
+                diagnostics.push(Diagnostic::new(Code::ResonanceDropped, message));
             }
         }
     }
-    found
+    diagnostics
 }

@@ -36,7 +36,7 @@ pub(super) struct StudyCase<'m> {
     /// Error of the missing stress stiffness of the spin in the motion of the reference.
     pub stress_error: Option<StressError>,
     /// Warnings and notes about the motion of the reference.
-    pub found: Vec<Diagnostic>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl<'m> StudyCase<'m> {
@@ -73,9 +73,11 @@ impl<'m> StudyCase<'m> {
         let reserved = reserved + (1.0 - reserved) * (1.0 - StressError::left(stress_error.as_ref()));
         let warning = nodal.as_ref().and_then(NodalReference::warning);
         let unstressed = stress_error.as_ref().and_then(|own| own.warning(sources[0].body()));
-        let found = [framed.found, said, warning.into_iter().chain(unstressed).collect()].concat();
-        let mut own = Self { name, sources, scene, motion, nodal, reserved, stress_error, found };
-        own.found = std::mem::take(&mut own.found).into_iter().map(|said| own.about(said)).collect();
+        let diagnostics =
+            [framed.diagnostics, said, warning.into_iter().chain(unstressed).collect()].concat();
+        let mut own = Self { name, sources, scene, motion, nodal, reserved, stress_error, diagnostics };
+        own.diagnostics =
+            std::mem::take(&mut own.diagnostics).into_iter().map(|said| own.about(said)).collect();
         Ok(own)
     }
 

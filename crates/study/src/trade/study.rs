@@ -183,7 +183,7 @@ pub fn trade(
     };
     job.time_what_is_worth_it(&mut rows, recommended, settings.repeat, context)?;
     let of_variations = judge.as_ref().map_or(&[][..], Judge::diagnostics);
-    let found = cases.iter().flat_map(|case| &case.found).chain(of_variations);
+    let diagnostics = cases.iter().flat_map(|case| &case.diagnostics).chain(of_variations);
     let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
         scene,
@@ -197,7 +197,7 @@ pub fn trade(
         variations: judge.as_ref().map_or_else(Vec::new, |judge| judge.variations().to_vec()),
         cases: (0..cases.len()).map(seen).collect(),
         rows,
-        diagnostics: found.cloned().collect(),
+        diagnostics: diagnostics.cloned().collect(),
     })
 }
 

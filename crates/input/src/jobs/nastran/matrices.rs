@@ -162,11 +162,11 @@ impl Matrices {
     }
 
     /// Returns the matrices without the rows that follow others by constraints of the deck.
-    pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
+    pub(super) fn without_followers(self, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let Some((elimination, names)) = &self.followers else { return self };
         let followers = self.n_given - elimination.points.len();
         let message = format!("{followers} rows depend on others and are eliminated: {names}");
-        found.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
+        diagnostics.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
         let all: Vec<u32> = (0..elimination.points.len() as u32).collect();
         let map = RowMap::new(elimination.follows.clone(), elimination.picks.clone(), all);
         let rows = GivenRows::new(vec![map], HashMap::new());
@@ -213,7 +213,7 @@ impl Matrices {
 
     /// Returns the matrices without rows that are empty in both: rotations of solids, and all rows of points to which
     /// nothing is attached.
-    pub(super) fn without_empty_rows(self, found: &mut Vec<Diagnostic>) -> Self {
+    pub(super) fn without_empty_rows(self, diagnostics: &mut Vec<Diagnostic>) -> Self {
         let labels = &self.labels;
         let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], labels.len());
         let rows = || labels.iter().zip(&filled);
@@ -234,7 +234,7 @@ impl Matrices {
             "{left_out} rows without stiffness and mass are left out: {turning} rotations, {} of points that nothing is fixed to",
             left_out - turning
         );
-        found.push(Diagnostic::new(Code::RowsEmpty, message).in_file(&self.stiffness.path));
+        diagnostics.push(Diagnostic::new(Code::RowsEmpty, message).in_file(&self.stiffness.path));
         let labels = retained.iter().map(|&row| labels[row]).collect();
         let [stiffness, mass] = [self.stiffness, self.mass].map(|raw| principal(raw, &retained));
         Self { stiffness, mass, labels, retained: Some(retained), ..self }
