@@ -174,7 +174,7 @@ impl Explicit {
 
     /// Returns the largest length of the grid up to `length`. The first length is the unit of the grid.
     fn on_grid(&mut self, length: f64) -> f64 {
-        on_grid(*self.unit.get_or_insert(length), length)
+        on_grid(*self.unit.get_or_insert(length), length, LENGTHS_PER_OCTAVE)
     }
 
     /// Computes the state at `time` within the last step, with order 7.
@@ -281,9 +281,11 @@ impl Explicit {
     }
 }
 
-/// Returns the largest length unit 2^(k / 16) up to `length` ([`LENGTHS_PER_OCTAVE`]).
-pub(super) fn on_grid(unit: f64, length: f64) -> f64 {
-    unit * ((LENGTHS_PER_OCTAVE * (length / unit).log2()).floor() / LENGTHS_PER_OCTAVE).exp2()
+/// Returns the largest length unit 2^(k / per_octave) up to `length`. A length of the grid is itself, whatever its rounding.
+pub(super) fn on_grid(unit: f64, length: f64, per_octave: f64) -> f64 {
+    const ROUNDING: f64 = 1e-9;
+    let octaves = (length / unit).log2();
+    unit * ((per_octave * octaves + ROUNDING).floor() / per_octave).exp2()
 }
 
 /// Returns length and end of a step of `length` from `time`, at most to `end`: a remainder too short for a step of its own is

@@ -17,10 +17,15 @@ const STIFF: f64 = 8.0;
 /// Largest number of quadratures of [`POINTS`] points in a step, for overdamped oscillators: more need a shorter step.
 const MOST_PANELS: usize = 16;
 
-/// Safety factor of the step length, and the limits of its change.
+/// Safety factor of the step length, and the limit of its change.
 const STEP_SAFETY_FACTOR: f64 = 0.9;
 const MIN_STEP_FACTOR: f64 = 1.0 / 3.0;
-const MAX_STEP_FACTOR: f64 = 4.0;
+/// Lengths of steps in an octave. Rounding makes up to 1e-3 of the tolerance, which is near that of 64-bit numbers: on a finer grid
+/// lengths would hang on last bits.
+const LENGTHS_PER_OCTAVE: f64 = 4.0;
+/// Errors and changes below this part of the tolerance are taken for this part, since their digits are those of rounding. Steps
+/// therefore grow at most by the factor 1.9.
+const LEAST_SEEN: f64 = 3e-3;
 
 /// Tolerance relative to that of explicit steps: where stability limits these, their error is far below their tolerance, and long
 /// steps that used all of it would be less accurate than what they replace. The other limit is rounding.
@@ -189,7 +194,7 @@ impl Exponential {
         }
         let error = self.error(h);
         let factor =
-            (STEP_SAFETY_FACTOR * error.powf(-1.0 / NODES as f64)).clamp(MIN_STEP_FACTOR, MAX_STEP_FACTOR);
+            (STEP_SAFETY_FACTOR * error.max(LEAST_SEEN).powf(-1.0 / NODES as f64)).max(MIN_STEP_FACTOR);
         if error.is_nan() || error > 1.0 {
             return Ok(self.refuse(h, if factor < 1.0 { factor } else { MIN_STEP_FACTOR }));
         }
@@ -197,7 +202,7 @@ impl Exponential {
         self.last = Some([time, until, h]);
         self.end(system, h, state);
         self.limit *= GROWTH_OF_LIMIT;
-        let next = on_grid(self.longest, (h * factor).min(self.limit)).min(self.longest);
+        let next = on_grid(self.longest, (h * factor).min(self.limit), LENGTHS_PER_OCTAVE).min(self.longest);
         // A step that an end shortened tells nothing of longer ones.
         let whole = self.proposed.min(self.limit);
         self.proposed = if h < whole { whole.max(next) } else { next };
@@ -207,7 +212,7 @@ impl Exponential {
 
     /// Proposes a shorter step and forgets the last one.
     fn refuse(&mut self, h: f64, factor: f64) -> Option<f64> {
-        self.begin(on_grid(self.longest, h * factor));
+        self.begin(on_grid(self.longest, h * factor, LENGTHS_PER_OCTAVE));
         self.work.rejected += 1;
         None
     }
@@ -294,7 +299,7 @@ impl Exponential {
             }
             let change = self.solve(h) / self.tolerance;
             let ratio = match before {
-                Some(before) => Some(change / before),
+                Some(before) => Some(change.max(LEAST_SEEN) / before),
                 None => self.contraction.map(|contraction| contraction * h),
             };
             if before.is_some() {

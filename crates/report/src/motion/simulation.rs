@@ -269,7 +269,12 @@ impl<'a> SimulationFacts<'a> {
         } else {
             String::new()
         };
-        format!("{}{rejected}, {} evaluations", counted(self.steps as usize, "step"), self.evaluations)
+        // Implicit steps iterate to rounding: how often hangs on last bits.
+        let evaluations = match self.method {
+            MethodFacts::Adaptive { .. } => self.evaluations.to_string(),
+            MethodFacts::Conserving { .. } => format!("about {}", to_two_digits(self.evaluations)),
+        };
+        format!("{}{rejected}, {evaluations} evaluations", counted(self.steps as usize, "step"))
     }
 
     fn energy_in_words(&self, energy: &EnergyFacts) -> String {
@@ -560,4 +565,10 @@ pub fn simulation_csv(recording: &Recording) -> String {
         csv::push_row(&mut table, row.into_iter().map(csv::number));
     }
     table
+}
+
+/// Returns a number rounded to two digits.
+fn to_two_digits(number: u64) -> u64 {
+    let unit = 10u64.pow(number.checked_ilog10().unwrap_or(0).saturating_sub(1));
+    (number + unit / 2) / unit * unit
 }

@@ -13,11 +13,19 @@ use serde::Serialize;
 /// Error whose digits are those of rounding: they differ between processors.
 const ROUNDING: f64 = 1e-12;
 
+/// Estimated error relative to an FE model whose digits hang on rounding: the estimate magnifies it.
+const ROUNDING_OF_ESTIMATE: f64 = 1e-5;
+
 /// Returns the error of a quantity in words: `0.001 rad` for the attitude, `60 % of its limit` for recoveries, `1 %` for
 /// other quantities.
 pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> String {
+    above_in_words(quantity, error, ROUNDING, digits)
+}
+
+/// Returns the error of a quantity in words; `below 0.001 %` where it is not above `least`, but for zero.
+fn above_in_words(quantity: &str, error: f64, least: f64, digits: usize) -> String {
     let number = |factor: f64| match error {
-        error if 0.0 < error && error <= ROUNDING => format!("below {}", significant(factor * ROUNDING, 1)),
+        error if 0.0 < error && error <= least => format!("below {}", significant(factor * least, 1)),
         error => significant(factor * error, digits),
     };
     match quantity {
@@ -29,7 +37,7 @@ pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> Strin
 
 /// Returns errors with three digits: `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
 pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
-    errors_to_digits(errors, 3)
+    errors_above(errors, ROUNDING, 3)
 }
 
 /// Returns the tolerances of a scene in words; a recovery has a limit of its own.
@@ -40,10 +48,11 @@ pub(super) fn tolerances_in_words(tolerances: &PerQuantity<f64>) -> String {
     if tolerances.recovery.is_finite() { format!("{words}, recoveries within their limits") } else { words }
 }
 
-/// Returns the known errors in words with the given number of significant digits.
-fn errors_to_digits(errors: &OutputErrors, digits: usize) -> String {
-    let part =
-        |(name, error): (&str, Option<f64>)| Some(format!("{name} {}", error_in_words(name, error?, digits)));
+/// Returns the known errors in words with the given number of significant digits, those up to `least` as `below 0.001 %`.
+fn errors_above(errors: &OutputErrors, least: f64, digits: usize) -> String {
+    let part = |(name, error): (&str, Option<f64>)| {
+        Some(format!("{name} {}", above_in_words(name, error?, least, digits)))
+    };
     errors.named().into_iter().filter_map(part).collect::<Vec<_>>().join(", ")
 }
 
@@ -103,7 +112,7 @@ impl ReferenceErrorFacts {
             return format!("an unknown amount ({reason})");
         }
         let attitude = self.errors.attitude.filter(|angle| *angle > 0.0);
-        errors_to_digits(&OutputErrors { attitude, ..self.errors }, 2)
+        errors_above(&OutputErrors { attitude, ..self.errors }, ROUNDING_OF_ESTIMATE, 2)
     }
 
     fn in_words(&self) -> String {
