@@ -592,24 +592,27 @@ impl Body {
     }
 
     /// Returns which terms of the equations of motion a body needs for ranges of its motion, like `flexbody advise`, as a
-    /// dict: the largest rotation rate `spin` in Hz, the largest `deflection` of a node (1 % of its extent without), and
-    /// the mass `attached` to it, or a tuple of the mass and the interface that carries it.
+    /// dict: the largest rotation rate `spin` in Hz, the largest `deflection` of a node (that which the rotation causes without),
+    /// the `duration` of the motions (five revolutions without), and the mass `attached` to it, or a tuple of the mass and the
+    /// interface that carries it.
     #[pyo3(
         signature = (
             *,
             spin: "float" = None,
             deflection: "float | None" = None,
+            duration: "float | None" = None,
             attached: "_types.Attached | None" = None,
             rotation_given=false,
             limit: "float" = None,
         ),
-        text_signature = "($self, *, spin=0.0, deflection=None, attached=None, rotation_given=False, limit=0.05)"
+        text_signature = "($self, *, spin=0.0, deflection=None, duration=None, attached=None, rotation_given=False, limit=0.05)"
     )]
     fn advise<'py>(
         &self,
         py: Python<'py>,
         spin: Argument<'_, 'py>,
         deflection: Argument<'_, 'py>,
+        duration: Argument<'_, 'py>,
         attached: Argument<'_, 'py>,
         rotation_given: bool,
         limit: Argument<'_, 'py>,
@@ -620,6 +623,7 @@ impl Body {
         let ranges = Ranges {
             spin_hz: or(spin, "spin", 0.0)?,
             deflection: deflection.map(|given| real(given, "deflection")).transpose()?,
+            duration: duration.map(|given| real(given, "duration")).transpose()?,
             attached: attached.map(attached_mass).transpose()?,
             is_rotation_given: rotation_given,
             limit: or(limit, "limit", 0.05)?,

@@ -3,6 +3,7 @@
 use super::{FlexBody, ReportFormat};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::TermGroup;
+use flexbody_linalg::context::Context;
 use flexbody_report::{AdviceFacts, RunData};
 use flexbody_study::advice::{self, advise};
 pub use flexbody_study::advice::{AttachedMass, Ranges};
@@ -15,14 +16,14 @@ pub struct Advice<'b> {
 }
 
 impl FlexBody {
-    /// Returns the guidelines of the literature for ranges of spin, deflection and attached mass, like `flexbody
-    /// advise`.
+    /// Returns the terms that motions within ranges of spin and deflection need, and the guidelines of the literature, like
+    /// `flexbody advise`.
     ///
     /// # Errors
     /// FB801 for ranges that are negative or not finite, and for an unknown interface; FB225 for a body without mean
     /// axes.
     pub fn advise(&self, ranges: Ranges) -> Result<Advice<'_>> {
-        advise(&self.0, ranges).map(|inner| Advice { inner, body: self })
+        advise(&self.0, ranges, &Context::QUIET).map(|inner| Advice { inner, body: self })
     }
 }
 
@@ -33,11 +34,11 @@ impl Advice<'_> {
         self.inner.guideline().name
     }
 
-    /// Returns the groups of the kinetic energy with a term above the limit.
+    /// Returns the groups of the kinetic energy that the motions need; without motions those with a size above the limit.
     pub fn groups(&self) -> Vec<&'static str> {
         TermGroup::ALL
             .into_iter()
-            .filter(|group| self.inner.groups.has(*group))
+            .filter(|group| self.inner.groups().has(*group))
             .map(TermGroup::name)
             .collect()
     }

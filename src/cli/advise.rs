@@ -9,7 +9,7 @@ use flexbody_report::AdviceFacts;
 use flexbody_study::advice::{AttachedMass, Ranges, advise};
 
 pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
-    let mut run = Run::begin(arguments.printing, [&arguments.body], None, &arguments.report)?;
+    let mut run = Run::begin(arguments.printing, [&arguments.body], None, &arguments.report)?.with_progress();
     let attached = arguments.attached.as_deref().map(attached_mass).transpose()?;
     let body = run.read_body(&arguments.body)?;
     let ranges = Ranges {
@@ -18,11 +18,12 @@ pub(super) fn run(arguments: &AdviseArguments) -> Result<Outcome> {
             Deflection::Length(length) => length,
             Deflection::PartOfExtent(part) => part * body.extent(),
         }),
+        duration: arguments.duration,
         attached,
         is_rotation_given: arguments.rotation_given,
         limit: arguments.limit,
     };
-    let advice = advise(&body, ranges)?;
+    let advice = advise(&body, ranges, &run.context(false))?;
     run.note(advice.warning());
     let data = run.data()?;
     let facts = AdviceFacts::new(&advice, &body, &arguments.body.display().to_string(), &data);

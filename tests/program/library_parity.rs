@@ -237,8 +237,14 @@ fn trade(place: &Place) {
 
 fn advise(place: &Place) {
     let body = place.body();
-    let ranges =
-        Ranges { spin_hz: 10.0, deflection: None, attached: None, is_rotation_given: false, limit: 0.05 };
+    let ranges = Ranges {
+        spin_hz: 10.0,
+        deflection: None,
+        duration: None,
+        attached: None,
+        is_rotation_given: false,
+        limit: 0.05,
+    };
     let advice = body.advise(ranges).expect("advice");
     let results = place.results("advise b.h5 --spin 10");
     assert_same_results(&advice.report("b.h5", ReportFormat::Json), &results);

@@ -1,5 +1,7 @@
 //! Advice on the terms of the equations of motion for ranges of spin, deflection and attached mass, without a scene: the
-//! guidelines of \[WP19\] section 8.
+//! errors of motions sampled from these ranges, and the guidelines of \[WP19\] section 8.
+
+mod sampled;
 
 pub use crate::attached_mass::AttachedMass;
 use crate::attached_mass::Carried;
@@ -8,16 +10,18 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::ties::first_largest;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
     Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
 };
 use nalgebra::Matrix3;
+pub use sampled::{NotSampled, SampledMotions, SampledSet};
 use std::f64::consts::TAU;
 
-/// Largest deflection, relative to the extent of the body, that is assumed if none is stated. It is the value of the
-/// tables of \[WP19\].
+/// Largest deflection, relative to the extent of the body, that is assumed if none is stated and no motion was sampled. It is
+/// the value of the tables of \[WP19\].
 const ASSUMED_DEFLECTION: f64 = 0.01;
 
 /// Ranges of the motion of a body.
@@ -25,13 +29,17 @@ const ASSUMED_DEFLECTION: f64 = 0.01;
 pub struct Ranges {
     /// Largest rotation rate. Unit: Hz.
     pub spin_hz: f64,
-    /// Largest deflection of a node, in the unit of length of the body; `None` for 1 % of its extent.
+    /// Largest deflection of a node, in the unit of length of the body; `None` for that which the rotation causes.
     pub deflection: Option<f64>,
+    /// Duration of the motions, in the unit of time of the body; `None` for five revolutions, or 30 periods of the first
+    /// mode if these are shorter and a deflection is stated.
+    pub duration: Option<f64>,
     /// Mass attached to the body at an interface.
     pub attached: Option<AttachedMass>,
     /// True if joints prescribe the rotation, as those of a driven crank do.
     pub is_rotation_given: bool,
-    /// Largest size of a term, relative to the term that it is compared with, that may be left out.
+    /// Largest error of attitude (rad), deflection and stress in a motion; largest size of a term, relative to the term that
+    /// it is compared with, that a guideline may leave out.
     pub limit: f64,
 }
 
@@ -81,8 +89,10 @@ pub struct Advice {
     pub terms: Vec<AdvisedTerm>,
     /// The guidelines, from the fewest terms to all.
     pub guidelines: Vec<GuidelineAdvice>,
-    /// Groups of the kinetic energy with a term above the limit.
-    pub groups: TermGroups,
+    /// Errors of motions within the ranges, or the reason why there are none.
+    pub motions: std::result::Result<SampledMotions, NotSampled>,
+    /// Groups of the kinetic energy with a term whose size is above the limit.
+    pub groups_by_size: TermGroups,
     /// Largest part of the stiffness of a motion that the stress of the spin changes, by the estimate of the stiffness that
     /// the body does not have; zero if nothing is missing.
     pub missing_stress: f64,
@@ -99,6 +109,11 @@ impl Advice {
             );
             Diagnostic::new(Code::SpinSoftens, message)
         })
+    }
+
+    /// Returns the groups that a body needs: those of the sampled motions, without them those with a size above the limit.
+    pub fn groups(&self) -> TermGroups {
+        self.motions.as_ref().map_or(self.groups_by_size, |motions| motions.groups)
     }
 
     /// Returns the first guideline that qualifies. The last one always does.
@@ -125,17 +140,19 @@ const CORIOLIS_TORQUE: &str = "Coriolis torque";
 
 /// Returns the advice for a body in mean axes.
 ///
-/// The sizes of the terms are those of [`significances`] at the largest spin w, the angular acceleration w^2, and modal
-/// amplitudes that move a node by the largest deflection. An attached mass adds its inertia about the common centre of
-/// mass and lowers the first frequency.
+/// Motions within the ranges are simulated with all terms and with fewer. The sizes of the terms are those of
+/// [`significances`] at the largest spin w, the angular acceleration w^2, and modal amplitudes that move a node by the largest
+/// deflection. An attached mass adds its inertia about the common centre of mass and lowers the first frequency.
 ///
 /// # Errors
 /// FB801 for ranges that are negative or not finite, and for an unknown interface; FB225 and others if the body has no
-/// mean axes.
-pub fn advise(body: &FlexBody, ranges: Ranges) -> Result<Advice> {
+/// mean axes; the errors of [`trace`](flexbody_motion::scene::trace).
+pub fn advise(body: &FlexBody, ranges: Ranges, context: &Context<'_>) -> Result<Advice> {
     body.require_mean_axes("advise")?;
     refuse_ranges(&ranges)?;
-    let deflection = ranges.deflection.unwrap_or(ASSUMED_DEFLECTION * body.extent());
+    let motions = sampled::sampled(body, &ranges, context)?;
+    let of_motions = motions.as_ref().ok().map(|motions| motions.deflection).filter(|largest| *largest > 0.0);
+    let deflection = ranges.deflection.or(of_motions).unwrap_or(ASSUMED_DEFLECTION * body.extent());
     let spin = body.units().eigenvalue_of(ranges.spin_hz).sqrt();
     let carried = ranges.attached.as_ref().map(|attached| Carried::new(body, attached)).transpose()?;
     let inertia = carried.as_ref().map_or_else(Matrix3::zeros, Carried::inertia);
@@ -157,7 +174,8 @@ pub fn advise(body: &FlexBody, ranges: Ranges) -> Result<Advice> {
         deflection,
         first_frequency_hz: situation.first_rate.value / TAU * body.units().hertz(),
         speed_ratio: spin / situation.first_rate.value,
-        groups: TermGroup::ALL
+        motions,
+        groups_by_size: TermGroup::ALL
             .iter()
             .filter(|group| is_needed(group))
             .fold(TermGroups::NONE, |all, one| all.with(*one)),
@@ -198,6 +216,7 @@ fn refuse_ranges(ranges: &Ranges) -> Result<()> {
     let values = [
         ("rotation rate", ranges.spin_hz, 0.0),
         ("deflection", ranges.deflection.unwrap_or(1.0), f64::MIN_POSITIVE),
+        ("duration", ranges.duration.unwrap_or(1.0), f64::MIN_POSITIVE),
         ("attached mass", attached, 0.0),
         ("limit", ranges.limit, f64::MIN_POSITIVE),
     ];

@@ -15,16 +15,20 @@ pub struct AdviseArguments {
     /// Largest rotation rate of the body, in Hz
     #[arg(long, value_name = "HZ", default_value_t = 0.0)]
     pub spin: f64,
-    /// Largest deflection of a node, in the unit of length of the body, or as a percentage of its largest extent [default: 1%]
+    /// Largest deflection of a node, in the unit of length of the body, or as a percentage of its largest extent [default: that which
+    /// the rotation causes]
     #[arg(long, value_name = "LENGTH|PERCENT%", value_parser = deflection)]
     pub deflection: Option<Deflection>,
+    /// Duration of the motions, in the unit of time of the body [default: five revolutions]
+    #[arg(long, value_name = "TIME")]
+    pub duration: Option<f64>,
     /// Mass attached to the body, in its unit of mass, at an interface or at the farthest node: MASS or MASS@INTERFACE
     #[arg(long, value_name = "MASS[@INTERFACE]")]
     pub attached: Option<String>,
     /// The rotation is prescribed by joints, as that of a driven crank
     #[arg(long)]
     pub rotation_given: bool,
-    /// Largest size of a term that may be left out, relative to what it is compared with
+    /// Largest error of attitude (rad), deflection and stress, and largest relative size of a term that a guideline leaves out
     #[arg(long, value_name = "REL", value_parser = ratio, default_value_t = 0.05)]
     pub limit: f64,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)

@@ -1,13 +1,16 @@
-//! Report on advice: guidelines of the literature for ranges of motion, and the settings of other programs.
+//! Report on advice for ranges of motion: errors of sampled motions without terms, guidelines of the literature, and the settings of
+//! other programs.
 
+use super::errors::{error_in_words, errors_in_words, groups_in_words};
 use crate::document::{Block, Document, Format, Inline, State, Table, Term, cells, heading};
-use crate::notation::numbers::{frequency, percent, significant};
+use crate::notation::numbers::{frequency, percent, sentence, significant};
 use crate::notation::units::UnitFacts;
 use crate::run_data::RunData;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
-use flexbody_study::advice::{Advice, AdvisedTerm, GuidelineAdvice};
+use flexbody_motion::scene::OutputErrors;
+use flexbody_study::advice::{Advice, AdvisedTerm, GuidelineAdvice, SampledMotions, SampledSet};
 use flexbody_study::recipe::advised;
 use serde::Serialize;
 
@@ -32,13 +35,41 @@ pub struct AdviceFacts<'a> {
     rotation: &'static str,
     limit: f64,
     guideline: &'static str,
-    /// Groups of the kinetic energy with a term above the limit.
+    /// Groups of the kinetic energy that the body needs: those of the sampled motions, without them those by size.
     groups: Vec<&'static str>,
+    /// Groups of the kinetic energy with a term whose size is above the limit.
+    groups_by_size: Vec<&'static str>,
+    /// Errors of sampled motions.
+    motions: Option<MotionsFacts>,
+    /// Reason why no motions were sampled.
+    not_sampled: Option<&'a str>,
     command: String,
     guidelines: Vec<GuidelineFacts>,
     terms: Vec<TermFacts>,
     programs: Vec<ProgramFacts>,
     diagnostics: &'a [Diagnostic],
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct MotionsFacts {
+    count: usize,
+    duration: f64,
+    sets: Vec<SetFacts>,
+}
+
+/// Errors of the motions with some terms only.
+#[derive(Debug, Clone, Serialize)]
+struct SetFacts {
+    groups: Vec<&'static str>,
+    #[serde(flatten)]
+    errors: OutputErrors,
+    /// Largest error over the limit; `None` if a motion could not be integrated.
+    worst: Option<f64>,
+    /// Number (from 1) of the motion with this error.
+    motion: usize,
+    holds: bool,
+    /// Reason why there are no errors; empty if there are errors.
+    remark: String,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -71,9 +102,81 @@ struct ProgramFacts {
     setting: &'static str,
 }
 
+impl MotionsFacts {
+    fn new(motions: &SampledMotions, is_rotation_given: bool) -> Self {
+        // A given rotation has no error, and the reaction that gives it is not asked for.
+        let judged = |errors: OutputErrors| OutputErrors {
+            attitude: errors.attitude.filter(|_| !is_rotation_given),
+            reaction: None,
+            ..errors
+        };
+        let set = |set: &SampledSet| SetFacts {
+            groups: names(set.groups),
+            errors: set.errors.map(judged).unwrap_or_default(),
+            worst: set.errors.map(|_| set.worst),
+            motion: set.motion + 1,
+            holds: set.holds(),
+            remark: set.remark.clone(),
+        };
+        Self {
+            count: motions.count,
+            duration: motions.duration,
+            sets: motions.sets.iter().map(set).collect(),
+        }
+    }
+
+    fn in_words(&self, units: &UnitFacts) -> String {
+        format!("in {} motions of {}", self.count, units.time_of(self.duration, 3))
+    }
+
+    /// Returns the reason for the groups: the errors of the set that holds, or those of leaving out anything.
+    fn reason(&self, groups: &[&'static str], limit: f64) -> String {
+        match self.sets.last() {
+            None => "the body has no terms that could be left out".to_owned(),
+            Some(set) if set.holds => {
+                format!(
+                    "the errors are then at most {} (limit {})",
+                    errors_in_words(&set.errors),
+                    percent(limit)
+                )
+            }
+            Some(_) => {
+                let least = self.sets.iter().filter_map(|set| set.worst).fold(f64::INFINITY, f64::min);
+                format!(
+                    "leaving out any of {} makes an error of at least {}",
+                    groups_in_words(groups),
+                    percent(least * limit)
+                )
+            }
+        }
+    }
+
+    fn table(&self) -> Table {
+        let row = |set: &SetFacts| {
+            let error = |name: &str, error: Option<f64>| match error {
+                Some(error) => error_in_words(name, error, 3),
+                None if set.remark.is_empty() => "\u{2013}".to_owned(),
+                None => set.remark.clone(),
+            };
+            cells([
+                groups_in_words(&set.groups),
+                error("attitude", set.errors.attitude),
+                error("deflection", set.errors.deflection),
+                error("stress", set.errors.stress),
+                set.motion.to_string(),
+                if set.holds { "yes" } else { "no" }.to_owned(),
+            ])
+        };
+        let heads = ["Terms", "Attitude", "Deflection", "Stress", "Worst motion", "Within the limit"];
+        let rows = self.sets.iter().map(row).collect();
+        Table::new("Largest errors beside the whole body, with these terms alone", heads, &[0], rows)
+            .in_text(|_| true)
+    }
+}
+
 impl<'a> AdviceFacts<'a> {
     /// Collects the facts of an advice for `body`. `path` is the file of the body as the command line named it.
-    pub fn new(advice: &Advice, body: &'a FlexBody, path: &str, run: &'a RunData) -> Self {
+    pub fn new(advice: &'a Advice, body: &'a FlexBody, path: &str, run: &'a RunData) -> Self {
         let terms = &advice.terms;
         let guideline = |one: &GuidelineAdvice| {
             let largest = one.largest_left_out.map(|at| &terms[at]);
@@ -95,11 +198,10 @@ impl<'a> AdviceFacts<'a> {
             size: one.size,
             counts: one.counts,
         };
-        let groups = TermGroup::ALL.into_iter().filter(|group| advice.groups.has(*group));
         Self {
             format: "flexbody-advice",
             format_major: 1,
-            format_minor: 0,
+            format_minor: 1,
             generator: generator(),
             body: &body.description().name,
             units: UnitFacts::new(body.units()),
@@ -112,11 +214,18 @@ impl<'a> AdviceFacts<'a> {
             rotation: if advice.ranges.is_rotation_given { "given" } else { "free" },
             limit: advice.ranges.limit,
             guideline: advice.guideline().name,
-            groups: groups.map(TermGroup::name).collect(),
-            command: advised(path, advice.groups),
+            groups: names(advice.groups()),
+            groups_by_size: names(advice.groups_by_size),
+            motions: advice
+                .motions
+                .as_ref()
+                .ok()
+                .map(|motions| MotionsFacts::new(motions, advice.ranges.is_rotation_given)),
+            not_sampled: advice.motions.as_ref().err().map(String::as_str),
+            command: advised(path, advice.groups()),
             guidelines: advice.guidelines.iter().map(guideline).collect(),
             terms: terms.iter().map(term).collect(),
-            programs: programs(advice.groups),
+            programs: programs(advice.groups()),
             diagnostics: &run.diagnostics,
         }
     }
@@ -128,16 +237,20 @@ impl<'a> AdviceFacts<'a> {
 
     fn document(&self) -> Document<'_> {
         let verdict = self.verdict();
-        let mut terms = vec![Term::text("Advice", format!("guideline {}: {verdict}", self.guideline))];
+        let kept = self.kept();
+        let mut terms = vec![Term::text("Advice", format!("{kept}: {verdict}"))];
         terms.extend(self.asked());
+        terms.push(Term::new("Guideline", self.guideline_in_words()));
         terms.push(Term::new("Command", self.command.as_str()));
         let mut blocks = vec![
-            Block::Verdict {
-                state: State::Given,
-                head: format!("Guideline {}.", self.guideline),
-                rest: verdict,
-            },
+            Block::Verdict { state: State::Given, head: format!("{}.", sentence(&kept)), rest: verdict },
             Block::Terms(terms),
+        ];
+        if let Some(motions) = &self.motions {
+            let table = motions.table();
+            blocks.extend([Block::Gap, heading("Sampled motions"), Block::Table(table)]);
+        }
+        blocks.extend([
             Block::Gap,
             heading("Guidelines"),
             Block::Table(self.guideline_table()),
@@ -147,18 +260,45 @@ impl<'a> AdviceFacts<'a> {
             Block::Gap,
             heading("Settings of other programs"),
             Block::Table(self.program_table()),
-        ];
+        ]);
         blocks.push(Block::Diagnostics(self.diagnostics));
         Document { name: self.body, kind: "Advice", generator: &self.generator, blocks }
     }
 
-    fn verdict(&self) -> String {
-        let groups = if self.groups.is_empty() {
+    fn kept(&self) -> String {
+        if self.groups.is_empty() {
             "the inertia of the undeformed body is enough".to_owned()
         } else {
-            format!("keep the terms of {}", self.groups.join(", "))
-        };
-        format!("{groups}; every term left out is below {} of what it is compared with", percent(self.limit))
+            format!("keep the terms of {}", groups_in_words(&self.groups))
+        }
+    }
+
+    fn verdict(&self) -> String {
+        match &self.motions {
+            Some(motions) => format!(
+                "{}, sampled in these ranges, {}",
+                motions.in_words(&self.units),
+                motions.reason(&self.groups, self.limit)
+            ),
+            None => format!(
+                "by the sizes of the terms alone, which are no errors: every term left out is below {} of what it is compared with ({})",
+                percent(self.limit),
+                self.not_sampled.unwrap_or_default()
+            ),
+        }
+    }
+
+    fn guideline_in_words(&self) -> String {
+        let leaves_out =
+            self.guidelines.iter().any(|own| own.name == self.guideline && own.criterion.is_some());
+        if !leaves_out {
+            return format!("{}: it leaves out nothing", self.guideline);
+        }
+        format!(
+            "{}: every term that it leaves out has a size below {} of what it is compared with; a size is no error",
+            self.guideline,
+            percent(self.limit)
+        )
     }
 
     fn asked(&self) -> Vec<Term> {
@@ -231,6 +371,10 @@ impl<'a> AdviceFacts<'a> {
         let rows = self.programs.iter().map(row).collect();
         Table::new("Settings that keep these terms", ["Program", "Setting"], &[0, 1], rows).in_text(|_| true)
     }
+}
+
+fn names(groups: TermGroups) -> Vec<&'static str> {
+    TermGroup::ALL.into_iter().filter(|group| groups.has(*group)).map(TermGroup::name).collect()
 }
 
 /// Returns the settings of multibody programs that compute at least these groups. The invariants of Adams are numbered 1

@@ -19,7 +19,7 @@ const PART_OF_BOUNDS: f64 = 0.5;
 pub(super) const SLACK_OF_RANGE: f64 = 1.01;
 
 /// Returns the sets of groups that a body may keep, cheapest first. A carried body has W2 and W3 only beside W1.
-pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = TermGroups> {
+pub(crate) fn sets_in(carried: bool) -> impl Iterator<Item = TermGroups> {
     sets().filter(move |set| !carried || set.in_carried_modes() == *set)
 }
 
@@ -75,7 +75,7 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
 }
 
 /// Scene in which models are tested.
-pub(super) struct Case<'c> {
+pub(crate) struct Case<'c> {
     pub body: &'c FlexBody,
     pub scene: &'c Scene,
     pub situation: Situation,
@@ -85,7 +85,7 @@ pub(super) struct Case<'c> {
 }
 
 impl<'c> Case<'c> {
-    pub(super) fn new(body: &'c FlexBody, scene: &'c Scene, context: &Context<'c>) -> Result<Self> {
+    pub(crate) fn new(body: &'c FlexBody, scene: &'c Scene, context: &Context<'c>) -> Result<Self> {
         let (loads, watched) = points_of(body, scene)?;
         let situation = Situation::new(body, scene, &loads);
         Ok(Self { body, scene, situation, loads, watched, context: *context })
@@ -102,7 +102,7 @@ impl<'c> Case<'c> {
         [Some(rigid), own].into_iter().flatten().collect()
     }
 
-    pub(super) fn runs(&self) -> TrialRuns<'_> {
+    pub(crate) fn runs(&self) -> TrialRuns<'_> {
         let Self { body, scene, situation, loads, watched, context } = self;
         TrialRuns { body, scene, situation, loads, watched, context: *context }
     }

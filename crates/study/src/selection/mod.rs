@@ -19,6 +19,7 @@ mod variations;
 pub use bounds::{
     Amplitude, Driven, ErrorBound, LoadSizes, ModalLoad, Rotation, Start, TorqueDefect, Variation,
 };
+pub(crate) use cases::{Case, sets_in};
 pub use decisions::{DecisiveError, NOT_JUDGED};
 pub use demand::{BEYOND_BAND, Participation, WantedResponses, largest_eigenvalue, participations};
 pub use norms::Norms;
@@ -27,6 +28,7 @@ pub(crate) use ranking::{fewest, first_of};
 pub use search::most_excited_modes;
 pub use select::{CaseSelection, Selection, rule_out, select, select_judged};
 pub use significance::{Significance, significances};
+pub(crate) use situation::PointRows;
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};
 #[cfg(feature = "hdf5")]
