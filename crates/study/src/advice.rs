@@ -1,6 +1,7 @@
 //! Advice on the terms of the equations of motion for ranges of spin, deflection and attached mass, without a scene: the
 //! errors of motions sampled from these ranges, and the guidelines of \[WP19\] section 8.
 
+mod ranges;
 mod sampled;
 
 pub use crate::attached_mass::AttachedMass;
@@ -17,31 +18,13 @@ use flexbody_motion::scene::{
     Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
 };
 use nalgebra::Matrix3;
+pub use ranges::Ranges;
 pub use sampled::{NotSampled, SampledMotions, SampledSet};
 use std::f64::consts::TAU;
 
 /// Largest deflection, relative to the extent of the body, that is assumed if none is stated and no motion was sampled. It is
 /// the value of the tables of \[WP19\].
 const ASSUMED_DEFLECTION: f64 = 0.01;
-
-/// Ranges of the motion of a body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ranges {
-    /// Largest rotation rate. Unit: Hz.
-    pub spin_hz: f64,
-    /// Largest deflection of a node, in the unit of length of the body; `None` for that which the rotation causes.
-    pub deflection: Option<f64>,
-    /// Duration of the motions, in the unit of time of the body; `None` for five revolutions, or 30 periods of the first
-    /// mode if these are shorter and a deflection is stated.
-    pub duration: Option<f64>,
-    /// Mass attached to the body at an interface.
-    pub attached: Option<AttachedMass>,
-    /// True if joints prescribe the rotation, as those of a driven crank do.
-    pub is_rotation_given: bool,
-    /// Largest error of attitude (rad), deflection and stress in a motion; largest size of a term, relative to the term that
-    /// it is compared with, that a guideline may leave out.
-    pub limit: f64,
-}
 
 /// Size of one term beside the term that it is compared with.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,7 +132,7 @@ const CORIOLIS_TORQUE: &str = "Coriolis torque";
 /// mean axes; the errors of [`trace`](flexbody_motion::scene::trace).
 pub fn advise(body: &FlexBody, ranges: Ranges, context: &Context<'_>) -> Result<Advice> {
     body.require_mean_axes("advise")?;
-    refuse_ranges(&ranges)?;
+    ranges.refuse()?;
     let motions = sampled::sampled(body, &ranges, context)?;
     let of_motions = motions.as_ref().ok().map(|motions| motions.deflection).filter(|largest| *largest > 0.0);
     let deflection = ranges.deflection.or(of_motions).unwrap_or(ASSUMED_DEFLECTION * body.extent());
@@ -208,24 +191,6 @@ fn guideline(
         keeps,
         largest_left_out: largest,
         ratio: largest.map_or(0.0, |at| terms[at].size / limit),
-    }
-}
-
-fn refuse_ranges(ranges: &Ranges) -> Result<()> {
-    let attached = ranges.attached.as_ref().map_or(0.0, |attached| attached.mass);
-    let values = [
-        ("rotation rate", ranges.spin_hz, 0.0),
-        ("deflection", ranges.deflection.unwrap_or(1.0), f64::MIN_POSITIVE),
-        ("duration", ranges.duration.unwrap_or(1.0), f64::MIN_POSITIVE),
-        ("attached mass", attached, 0.0),
-        ("limit", ranges.limit, f64::MIN_POSITIVE),
-    ];
-    match values.into_iter().find(|(_, value, least)| !value.is_finite() || value < least) {
-        Some((name, value, _)) => {
-            let message = format!("the {name} is {value}, expected a finite number that is not negative");
-            Err(Diagnostic::new(Code::Usage, message).into())
-        }
-        None => Ok(()),
     }
 }
 

@@ -425,13 +425,15 @@ class Body:
         *,
         spin: float = 0.0,
         deflection: float | None = None,
+        duration: float | None = None,
         attached: _types.Attached | None = None,
         rotation_given: bool = False,
         limit: float = 0.05,
     ) -> dict[str, Any]:
         """Returns which terms of the equations of motion a body needs for ranges of its motion, like `flexbody advise`, as a
-        dict: the largest rotation rate `spin` in Hz, the largest `deflection` of a node (1 % of its extent without), and
-        the mass `attached` to it, or a tuple of the mass and the interface that carries it.
+        dict: the largest rotation rate `spin` in Hz, the largest `deflection` of a node (that which the rotation causes without),
+        the `duration` of the motions (five revolutions without), and the mass `attached` to it, or a tuple of the mass and the
+        interface that carries it.
         """
 
     def select(self, scene: _Cases) -> Selection:

@@ -41,7 +41,7 @@ impl RigidAccelerations {
     }
 
     /// Returns psi_j'M g of every mode; `None` for a body without W1.
-    fn modal(&self, body: &Invariants) -> Option<Vec<f64>> {
+    pub fn modal(&self, body: &Invariants) -> Option<Vec<f64>> {
         let (c1, ibar) = (body.c1(), body.ibar()?);
         let one = |j: usize| {
             let mut sum = (0..3).map(|l| c1[(l, j)] * self.constant[l]).sum::<f64>();

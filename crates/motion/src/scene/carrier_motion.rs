@@ -12,7 +12,7 @@ const INTERVALS: usize = 200;
 ///
 /// * `scene`: in the frame of the body. The orientation follows the angular velocity at each instant; gravity alone
 ///   depends on it.
-pub(super) fn accelerations(frame: &Frame, scene: &Scene) -> Vec<RigidAccelerations> {
+pub fn carrier_accelerations(frame: &Frame, scene: &Scene) -> Vec<RigidAccelerations> {
     let driving = Driving::new(frame, scene);
     let step = scene.run.duration.map_or(0.0, |duration| duration / INTERVALS as f64);
     let count = if step > 0.0 { INTERVALS + 1 } else { 1 };

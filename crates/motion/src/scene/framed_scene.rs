@@ -4,7 +4,7 @@
 //! of a scene does not depend on this choice: everything is computed in the frame defined here, and vectors
 //! of the results are along its axes, which are those of the model.
 
-use super::carrier_motion::accelerations;
+use super::carrier_motion::carrier_accelerations;
 use super::{Axes, Carried, History, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -76,7 +76,7 @@ impl<'a> FramedScene<'a> {
         let mut resolved = resolved(scene, &body.frame().axes, &framed_body.frame().origin);
         diagnostics.extend(idle(&framed_body, &resolved));
         if let Some(carrier) = scene.carried.as_ref().map(Carried::carrier) {
-            let motion = accelerations(framed_body.frame(), &resolved);
+            let motion = carrier_accelerations(framed_body.frame(), &resolved);
             diagnostics.extend(framed_body.lacks_response(&carrier, body, motion));
         }
         diagnostics.extend(gravity_in_other_units(body.units(), scene));

@@ -31,6 +31,7 @@ mod stress_error;
 mod surroundings;
 mod trace;
 
+pub use carrier_motion::carrier_accelerations;
 pub use channels::Channels;
 pub use description::{
     Carried, CarriedSpin, CaseName, Change, Drive, Initial, Load, ModeStart, Point, Run, Scene,

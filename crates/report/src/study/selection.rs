@@ -14,7 +14,10 @@ use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 use flexbody_linalg::ties::sort_descending;
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
-use flexbody_study::selection::{CaseSelection, DecisiveError, Participation, Selection, Trial};
+use flexbody_study::selection::{
+    CaseSelection, DecisiveError, ErrorSource, Excitation, ModeReasons, ModeWorth, Participation, Selection,
+    Trial,
+};
 use serde::Serialize;
 
 /// Number of modes that a summary lists.
@@ -79,8 +82,55 @@ struct ModesFacts<'a> {
     /// Numbers of the kept modes, from 1.
     kept: Vec<usize>,
     reason: &'a str,
+    /// Excitations of the modes and the worth of those at the edge; `None` unless the fewest modes were looked for.
+    reasons: Option<ModeReasonFacts<'a>>,
     static_responses: Vec<ResponseFacts<'a>>,
     shares: Vec<ShareFacts>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ModeReasonFacts<'a> {
+    excited: Vec<ExcitationFacts<'a>>,
+    without_last: Option<ModeWorthFacts>,
+    with_next: Option<ModeWorthFacts>,
+    /// Source of most of the remaining error: `modes`, `terms` or `body`.
+    remaining_error: Option<&'static str>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ExcitationFacts<'a> {
+    by: &'a str,
+    /// Numbers from 1.
+    modes: Vec<usize>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ModeWorthFacts {
+    /// Number from 1.
+    mode: usize,
+    output: &'static str,
+    error: f64,
+}
+
+impl<'a> ModeReasonFacts<'a> {
+    fn new(reasons: &'a ModeReasons) -> Self {
+        let excitation = |own: &'a Excitation| ExcitationFacts {
+            by: &own.by,
+            modes: own.modes.iter().map(|mode| mode + 1).collect(),
+        };
+        let worth =
+            |own: ModeWorth| ModeWorthFacts { mode: own.mode + 1, output: own.output, error: own.error };
+        Self {
+            excited: reasons.excited.iter().map(excitation).collect(),
+            without_last: reasons.without_last.map(worth),
+            with_next: reasons.with_next.map(worth),
+            remaining_error: reasons.rest.map(|source| match source {
+                ErrorSource::Modes => "modes",
+                ErrorSource::Groups => "terms",
+                ErrorSource::Body => "body",
+            }),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -226,6 +276,7 @@ impl<'a> SelectionFacts<'a> {
                 of: selection.n_modes,
                 kept: selection.modes.iter().map(|j| j + 1).collect(),
                 reason: &selection.mode_reason,
+                reasons: selection.mode_reasons.as_ref().map(ModeReasonFacts::new),
                 static_responses: selection.participations.iter().map(ResponseFacts::new).collect(),
                 shares: shares.collect(),
             },
@@ -274,7 +325,7 @@ impl<'a> SelectionFacts<'a> {
         }
     }
 
-    /// Renders the five lines of the verdict.
+    /// Renders the lines of the verdict.
     pub fn summary(&self) -> String {
         text::render(&[Block::Terms(self.head())], Screen::default())
     }
@@ -284,7 +335,8 @@ impl<'a> SelectionFacts<'a> {
         let [asked, (label, taken), rest @ ..] = self.verdict.lines();
         let mut terms = vec![Term::text("Selection", format!("{}: {}", self.scene, self.body))];
         terms.extend([Term::new(asked.0, asked.1), Term::text(label, taken)]);
-        terms.extend(rest.map(|(label, line)| Term::new(label, line)));
+        let told = rest.into_iter().filter(|(_, line)| !line.is_empty());
+        terms.extend(told.map(|(label, line)| Term::new(label, line)));
         terms.extend(in_words(&self.variations).map(|words| Term::new("Variations", words)));
         terms.extend(self.command.as_ref().map(|command| Term::new("Command", command.as_str())));
         terms

@@ -1,16 +1,18 @@
-//! Verdict of a selection in five lines: request, recommendation, reason, error, savings.
+//! Verdict of a selection in a few lines: request, recommendation, reason, modes, error, savings.
 
 use super::errors::{ReferenceErrorFacts, error_in_words, errors_in_words, groups_in_words, ranges};
 use crate::notation::numbers::{counted, frequency, significant};
 use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::selection::{DecisiveError, NOT_JUDGED, Selection};
+use flexbody_study::selection::{
+    DecisiveError, ErrorSource, Excitation, ModeReasons, ModeWorth, NOT_JUDGED, Selection,
+};
 use serde::Serialize;
 
 /// Ratio of the multiplications below which the saving is stated in percent.
 const NEARLY_AS_MANY: f64 = 1.5;
 
-/// The five lines of the verdict.
+/// The lines of the verdict.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SelectionVerdict {
     /// True if the requirements are met.
@@ -18,6 +20,8 @@ pub(super) struct SelectionVerdict {
     pub asked: String,
     pub take: String,
     pub why: String,
+    /// Reasons for the modes; empty unless the fewest modes were looked for.
+    pub modes: String,
     pub error: String,
     pub saves: String,
 }
@@ -29,18 +33,20 @@ impl SelectionVerdict {
             asked: asked(selection),
             take: take(selection),
             why: why(selection),
+            modes: selection.mode_reasons.as_ref().map_or_else(String::new, |own| of_modes(own, selection)),
             error: error(selection),
             saves: saves(selection),
         }
     }
 
     /// Returns the lines with their labels.
-    pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
+    pub(crate) fn lines(&self) -> [(&'static str, &str); 6] {
         let found = if self.holds { "Recommended" } else { "Best found" };
         [
             ("Asked", self.asked.as_str()),
             (found, self.take.as_str()),
             ("Why", self.why.as_str()),
+            ("Its modes", self.modes.as_str()),
             ("Error", self.error.as_str()),
             ("Saves", self.saves.as_str()),
         ]
@@ -144,6 +150,39 @@ fn why(selection: &Selection) -> String {
         reason(decision) + &in_case(case, selection)
     });
     parts.collect::<Vec<_>>().join("; ")
+}
+
+/// Returns the reasons for the modes in words: what excites them, what the modes at the edge of the selection are worth, and where
+/// most of the remaining error comes from.
+fn of_modes(reasons: &ModeReasons, selection: &Selection) -> String {
+    let excited = |own: &Excitation| {
+        let numbers: Vec<usize> = own.modes.iter().map(|mode| mode + 1).collect();
+        let (noun, verb) = if numbers.len() == 1 { ("mode", "is") } else { ("modes", "are") };
+        format!("{noun} {} {verb} excited by {}", ranges(&numbers), own.by)
+    };
+    let mode = |worth: &ModeWorth| {
+        format!("mode {} ({})", worth.mode + 1, frequency(selection.frequencies_hz[worth.mode], 3))
+    };
+    let error = |worth: &ModeWorth| {
+        format!("the error in {} is {}", worth.output, error_in_words(worth.output, worth.error, 2))
+    };
+    let edge: Vec<String> = [
+        reasons.without_last.as_ref().map(|last| format!("without {} {}", mode(last), error(last))),
+        reasons.with_next.as_ref().map(|next| format!("with {} as well {}", mode(next), error(next))),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let rest = reasons.rest.map(|source| {
+        let source = match source {
+            ErrorSource::Modes => "the dropped modes",
+            ErrorSource::Groups => "the dropped terms",
+            ErrorSource::Body => "what the body with all its modes lacks",
+        };
+        format!("most of the error that is left comes from {source}")
+    });
+    let edge = (!edge.is_empty()).then(|| edge.join(", "));
+    reasons.excited.iter().map(excited).chain(edge).chain(rest).collect::<Vec<_>>().join("; ")
 }
 
 fn reason(decision: &CommonDecision<'_>) -> String {

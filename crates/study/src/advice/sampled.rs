@@ -1,6 +1,6 @@
 //! Motions sampled from ranges, and what the terms change in them.
 
-use super::Ranges;
+use super::ranges::Ranges;
 use crate::selection::{Case, PointRows, Trial, sets_in};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};

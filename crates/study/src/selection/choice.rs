@@ -10,6 +10,10 @@ pub(super) struct Choice {
     pub modes: Vec<usize>,
     pub shares: Vec<ModeShare>,
     pub chosen: Option<Trial>,
+    /// All modes by descending contribution; empty unless the fewest modes were looked for.
+    pub ranked: Vec<usize>,
+    /// The chosen model with the next mode of this order as well.
+    pub next: Option<Trial>,
 }
 
 impl Choice {

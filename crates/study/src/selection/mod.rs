@@ -7,6 +7,7 @@ mod choice;
 mod decisions;
 mod demand;
 mod dropped_terms;
+mod mode_reasons;
 mod norms;
 mod ranking;
 mod search;
@@ -22,6 +23,7 @@ pub use bounds::{
 pub(crate) use cases::{Case, sets_in};
 pub use decisions::{DecisiveError, NOT_JUDGED};
 pub use demand::{BEYOND_BAND, Participation, WantedResponses, largest_eigenvalue, participations};
+pub use mode_reasons::{ErrorSource, Excitation, ModeReasons, ModeWorth};
 pub use norms::Norms;
 #[cfg(feature = "hdf5")]
 pub(crate) use ranking::{fewest, first_of};

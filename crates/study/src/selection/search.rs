@@ -56,6 +56,8 @@ impl<'s> SelectionState<'s> {
             modes: (0..demands[0].body.n_modes()).collect(),
             shares: Vec::new(),
             chosen: None,
+            ranked: Vec::new(),
+            next: None,
         };
         let (short_of, stress_errors) = (vec![None; demands.len()], vec![None; demands.len()]);
         let (chosen_by_case, varied) = (Vec::new(), Vec::new());
@@ -243,6 +245,11 @@ impl<'s> SelectionState<'s> {
             self.chosen_by_case.push(worst(chosen.into_iter()));
         }
         self.choice.chosen = Some(together(self.chosen_by_case.clone()));
+        let count = self.choice.modes.len();
+        if count < self.choice.ranked.len() {
+            let more = first_of(&self.choice.ranked, count + 1);
+            self.choice.next = Some(search.measured(&more, self.choice.groups, 1.0)?);
+        }
         Ok(())
     }
 }
@@ -368,6 +375,7 @@ impl SelectionSearch<'_> {
         };
         let enough = fewest(0, ranked.len(), passes)?;
         choice.keep_most(&ranked, enough);
+        choice.ranked = ranked;
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use super::choice::Choice;
 use super::decisions::{DecisionInput, DecisiveError, decision};
 use super::demand::{Demand, FramedTests, Participation, participations};
+use super::mode_reasons::ModeReasons;
 use super::search::SelectionState;
 use super::significance::{Significance, largest_significances, significances};
 use super::situation::Input;
@@ -49,6 +50,8 @@ pub struct Selection {
     pub participations: Vec<Participation>,
     /// Reason for the choice of modes.
     pub mode_reason: String,
+    /// Excitations of the modes and the worth of those at the edge; `None` unless the fewest modes were looked for.
+    pub mode_reasons: Option<ModeReasons>,
     /// Selected model, measured against the whole body; `None` if no motion was integrated.
     pub chosen: Option<Trial>,
     /// Multiplications of an evaluation of the equations with everything that the body holds.
@@ -172,14 +175,7 @@ pub fn select_judged(
     let mode_reason = if !selection_state.has_run() {
         selection_state.choose_by_band()
     } else {
-        let variations = cases.variations(body.dimension());
-        let framed = framed_variations(body, &variations)?;
-        context.phase("reference motion of the variations");
-        context.runs(variations.len());
-        let varied = VariedRuns::new(&variations, cases, &framed, varied_reference_errors, context)?;
-        selection_state.diagnostics.extend(varied.diagnostics.iter().cloned());
-        let varied = Some(&varied).filter(|varied| !varied.is_empty());
-        selection_state.choose_by_motion(cases, varied, context)?
+        choose_by_motion(&mut selection_state, body, varied_reference_errors, cases, context)?
     };
     // State the reasons of the decision.
     let SelectionState {
@@ -206,6 +202,7 @@ pub fn select_judged(
     let (terms, decisive_errors): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
     let first = &demands[0];
     Ok(Selection {
+        mode_reasons: ModeReasons::of(&demands, &choice, &trials),
         scene: cases.name().to_owned(),
         body: first.body.description().name.clone(),
         inputs: inputs(&demands),
@@ -233,6 +230,24 @@ pub fn select_judged(
         stress_error: worst_stress_error(&demands),
         diagnostics: once(diagnostics),
     })
+}
+
+/// Chooses terms and modes by integrated motion, beside the variations of the load cases. Returns the reason for the modes.
+fn choose_by_motion(
+    state: &mut SelectionState<'_>,
+    body: &FlexBody,
+    varied_reference_errors: &[Vec<ReferenceError>],
+    cases: &LoadCases,
+    context: &Context<'_>,
+) -> Result<String> {
+    let variations = cases.variations(body.dimension());
+    let framed = framed_variations(body, &variations)?;
+    context.phase("reference motion of the variations");
+    context.runs(variations.len());
+    let varied = VariedRuns::new(&variations, cases, &framed, varied_reference_errors, context)?;
+    state.diagnostics.extend(varied.diagnostics.iter().cloned());
+    let varied = Some(&varied).filter(|varied| !varied.is_empty());
+    state.choose_by_motion(cases, varied, context)
 }
 
 /// Brings the body and each load case into one frame.

@@ -412,7 +412,7 @@ impl<'b> PointRows<'b> {
     }
 
     /// Returns the rotations of a point by the modes (3 x nf), body axes. The point must have an orientation.
-    fn of_rotation(&self, point: &BodyPoint) -> DMatrix<f64> {
+    pub(super) fn of_rotation(&self, point: &BodyPoint) -> DMatrix<f64> {
         self.works(|rest, axis, forces| point.add_torque(rest, axis, forces))
     }
 
