@@ -22,7 +22,9 @@ pub struct Check {
 /// Returns identities as a list of `flexbody.Identity`.
 pub fn identities<'py>(py: Python<'py>, all: &[flexbody::Identity]) -> PyResult<Vec<IdentityTuple<'py>>> {
     let class = py.import("flexbody._types")?.getattr("Identity")?;
-    all.iter().map(|variation| class.call1((variation.name, variation.value, variation.limit, variation.holds))).collect()
+    all.iter()
+        .map(|variation| class.call1((variation.name, variation.value, variation.limit, variation.holds)))
+        .collect()
 }
 
 #[pymethods]

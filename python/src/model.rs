@@ -6,7 +6,7 @@ use crate::body_class::Body;
 use crate::choice::called;
 use crate::errors::{diagnostics, value, value_error, warn};
 use crate::response::{Response, ResponseArguments};
-use crate::scene::Scene;
+use crate::scene::{Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
 use crate::types::{Diagnostics, Floats};
 use crate::work::run;
@@ -434,6 +434,21 @@ impl Model {
         // Warnings about the model were issued when it was made.
         found.splice(0..0, self.inner.diagnostics().iter().cloned());
         Ok(Body::new(body, found))
+    }
+
+    /// Decides which terms and modes a body of the model needs in a scene, like `flexbody select model.toml`: a body with
+    /// `modes` free modes (by default those of the band of the scene, or 20) and residual vectors is made and judged.
+    #[pyo3(signature = (scene: "_Cases", *, modes: "int | None" = None))]
+    fn select(
+        &self,
+        py: Python<'_>,
+        scene: &Bound<'_, PyAny>,
+        modes: Argument<'_, '_>,
+    ) -> PyResult<Selection> {
+        let modes = modes.map(|given| count(given, "modes")).transpose()?;
+        let (scene, model) = (Scene::whole(scene)?, Arc::clone(&self.inner));
+        let selected = run(py, move |listener| model.select_with_progress(&scene, modes, listener))?;
+        Selection::with_warnings(py, selected)
     }
 
     /// Measures accuracy against cost in a scene: candidate bodies against a reference, like `flexbody.trade`. With

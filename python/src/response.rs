@@ -142,8 +142,10 @@ impl Response {
             let values = PyDict::new(py);
             values.set_item("rows", recovery.rows.iter().map(|row| row.name.as_str()).collect::<Vec<_>>())?;
             values.set_item("rms", vector(py, &recovery.rms))?;
-            values
-                .set_item("points", recovery.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>())?;
+            values.set_item(
+                "points",
+                recovery.points.iter().map(|point| point.name.as_str()).collect::<Vec<_>>(),
+            )?;
             values.set_item("von_mises", vector(py, &recovery.von_mises))?;
             all.set_item(&recovery.name, values)?;
         }

@@ -2,6 +2,7 @@
 
 use super::matrix::shown;
 use super::progress::{Listener, NO_LISTENER, heard};
+use super::scene::Subject;
 use super::{Matrix, Motion, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -209,7 +210,7 @@ impl FlexBody {
     pub fn select_with_progress(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
         let request = SelectionRequest::default();
         heard(listener, |context| request.for_body(&self.0, &scene.0, context))
-            .map(|selected| Selection { inner: selected.selection, is_of_body: true })
+            .map(|selected| Selection { inner: selected.selection, subject: Subject::Body })
     }
 
     /// Returns the body with some of its modes and groups of terms, like `flexbody reduce`.

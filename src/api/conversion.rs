@@ -1,6 +1,7 @@
 //! Conversion of a model to a body.
 
 use super::progress::{Listener, NO_LISTENER, heard};
+use super::scene::Subject;
 use super::{Basis, FlexBody, Model, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -10,6 +11,7 @@ use flexbody_eigen::Accuracy;
 use flexbody_motion::scene::LoadCases;
 use flexbody_study::conversion::ConversionRequest;
 use flexbody_study::selection;
+use flexbody_study::selection_request::SelectionRequest;
 
 /// Settings of a conversion. By default 20 free-surface modes, proved complete, about the centre of mass along the axes
 /// of the model.
@@ -137,7 +139,38 @@ impl Model {
     ) -> Result<(Conversion, Selection)> {
         let (conversion, selection) = self.converted(options, Some(&scene.0), listener)?;
         let inner = selection.expect("a conversion for a scene selects");
-        Ok((conversion, Selection { inner, is_of_body: false }))
+        Ok((conversion, Selection { inner, subject: Subject::Conversion }))
+    }
+
+    /// Makes a body with everything that the load cases of `scene` may need, and selects from its terms and modes, like
+    /// `flexbody select model.toml`. The body is not kept: [`Selection::command`] and [`Model::convert_for`] make it.
+    ///
+    /// * `modes`: number of its free modes; `None` for the band of the scene or the default number.
+    ///
+    /// # Errors
+    /// The errors of [`Model::convert`]; FB212 if the scene does not match the body; FB540 if its motion cannot be
+    /// integrated.
+    pub fn select(&self, scene: &Scene, modes: Option<usize>) -> Result<Selection> {
+        self.select_with_progress(scene, modes, NO_LISTENER)
+    }
+
+    /// Does the work of [`Model::select`] with a listener, which may stop it.
+    ///
+    /// # Errors
+    /// The errors of [`Model::select`]; FB605 if the listener stops it.
+    pub fn select_with_progress(
+        &self,
+        scene: &Scene,
+        modes: Option<usize>,
+        listener: Listener<'_>,
+    ) -> Result<Selection> {
+        let request = SelectionRequest { modes, scene_file: None };
+        let loads = &self.residual_vectors;
+        let selected = heard(listener, |context| request.for_model(&self.checked, loads, &scene.0, context))?;
+        let diagnostics = selected.diagnostics();
+        let inner = selection::Selection { diagnostics, ..selected.selection };
+        let scene = scene.0[0].source.as_ref().map(|file| file.name.clone());
+        Ok(Selection { inner, subject: Subject::Model { modes, scene } })
     }
 
     fn converted(

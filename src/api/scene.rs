@@ -3,7 +3,7 @@
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_motion::scene::LoadCases;
-use flexbody_study::recipe::{Origin, selected_from_file};
+use flexbody_study::recipe::{Origin, selected_from_file, selected_from_model};
 use flexbody_study::selection;
 use serde::Serialize;
 use std::path::Path;
@@ -134,8 +134,18 @@ fn of_value(found: Diagnostic, text: &str, path: &Path) -> Diagnostic {
 #[derive(Debug, Clone)]
 pub struct Selection {
     pub(super) inner: selection::Selection,
-    /// True if it was made for a body; false if the body was made for it.
-    pub(super) is_of_body: bool,
+    pub(super) subject: Subject,
+}
+
+/// Thing that a selection was made for.
+#[derive(Debug, Clone)]
+pub(super) enum Subject {
+    /// A body.
+    Body,
+    /// A model with the requested number of modes, and the name of the scene file.
+    Model { modes: Option<usize>, scene: Option<String> },
+    /// A body that was made for the scene.
+    Conversion,
 }
 
 impl Selection {
@@ -154,11 +164,19 @@ impl Selection {
         self.inner.holds()
     }
 
-    /// Returns the command that makes exactly the selected body from the flex-body file `body` that was judged. Returns
-    /// `None` for a selection of [`Model::convert_for`](crate::Model::convert_for), which has made the body.
-    pub fn command(&self, body: &str) -> Option<String> {
-        let origin = Origin { input: vec![body.to_owned()], scene: String::new(), case: None };
-        self.is_of_body.then(|| selected_from_file(&self.inner, &origin))
+    /// Returns the command that makes exactly the selected body from the file `input`: the flex-body file, or the model of
+    /// [`Model::select`](crate::Model::select), with the name of the scene file. Returns `None` for a selection of
+    /// [`Model::convert_for`](crate::Model::convert_for), which has made the body, and for a model with a scene of no file.
+    pub fn command(&self, input: &str) -> Option<String> {
+        let origin =
+            |scene: &str| Origin { input: vec![input.to_owned()], scene: scene.to_owned(), case: None };
+        match &self.subject {
+            Subject::Body => Some(selected_from_file(&self.inner, &origin(""))),
+            Subject::Model { modes, scene } => {
+                scene.as_ref().map(|scene| selected_from_model(&self.inner, &origin(scene), *modes))
+            }
+            Subject::Conversion => None,
+        }
     }
 
     /// Returns warnings and notes.

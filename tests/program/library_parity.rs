@@ -35,7 +35,7 @@ const COMMANDS: &[(&str, Counterpart)] = &[
     ("inspect", Function("FlexBody::report", inspect)),
     ("check", Function("FlexBody::check", check)),
     ("compare", Function("FlexBody::compare", compare)),
-    ("select", Function("FlexBody::select", select)),
+    ("select", Function("Model::select, FlexBody::select", select)),
     ("simulate", Function("FlexBody::simulate", simulate)),
     ("trade", Function("Model::trade, FlexBody::trade", trade)),
     ("advise", Function("FlexBody::advise", advise)),
@@ -214,6 +214,10 @@ fn compare(place: &Place) {
 fn select(place: &Place) {
     let selection = place.body().select(&place.scene()).expect("a selection");
     assert_same_results(&selection.report(ReportFormat::Json), &place.results(RUN));
+    let of_model = place.model().select(&place.scene(), Some(6)).expect("a selection");
+    let results = place.results("select model.toml --modes 6 --scene scene.toml");
+    assert_same_results(&of_model.report(ReportFormat::Json), &results);
+    assert_eq!(of_model.command("model.toml").as_deref(), results["command"].as_str());
 }
 
 fn simulate(place: &Place) {

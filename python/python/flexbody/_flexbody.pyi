@@ -808,6 +808,11 @@ class Model:
         Raises InputError, NumericalError or ResourceError.
         """
 
+    def select(self, scene: _Cases, *, modes: int | None = None) -> Selection:
+        """Decides which terms and modes a body of the model needs in a scene, like `flexbody select model.toml`: a body with
+        `modes` free modes (by default those of the band of the scene, or 20) and residual vectors is made and judged.
+        """
+
     def trade(self, scene: _Cases, *, modes: int = 20, repeat: int = 3, reference: _types.Reference = "full") -> Trade:
         """Measures accuracy against cost in a scene: candidate bodies against a reference, like `flexbody.trade`. With
         several load cases every candidate is measured in each of them and judged by the worst.

@@ -55,7 +55,8 @@ fn a_selection_is_what_its_schema_says_and_a_body_is_made_of_it() {
     let (verdict, details) = text.split_once("\nDetails\n").expect("the verdict, then the details");
     let labels =
         verdict.lines().filter_map(|line| line.get(..12)).map(str::trim).filter(|label| !label.is_empty());
-    let expected = ["Selection", "Asked", "Recommended", "Why", "Error", "Saves", "Variations", "Command"];
+    let expected =
+        ["Selection", "Asked", "Recommended", "Why", "Its modes", "Error", "Saves", "Variations", "Command"];
     assert_eq!(labels.collect::<Vec<_>>(), expected, "{verdict}");
     // The words agree with the numbers; tiers are shown in the details only.
     let words = |key: &str| told["verdict"][key].as_str().expect("a sentence");

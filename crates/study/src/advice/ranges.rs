@@ -11,8 +11,8 @@ pub struct Ranges {
     pub spin_hz: f64,
     /// Largest deflection of a node, in the unit of length of the body; `None` for that which the rotation causes.
     pub deflection: Option<f64>,
-    /// Duration of the motions, in the unit of time of the body; `None` for five revolutions, or 30 periods of the first
-    /// mode if these are shorter and a deflection is stated.
+    /// Duration of the motions, in the unit of time of the body; `None` for five revolutions, but at most 1e5 periods of the
+    /// first mode, and 30 if a deflection is stated.
     pub duration: Option<f64>,
     /// Mass attached to the body at an interface.
     pub attached: Option<AttachedMass>,

@@ -29,6 +29,9 @@ const TOLERANCE: f64 = 1e-6;
 /// are at rest by then.
 const PERIODS: f64 = 30.0;
 
+/// Longest duration that is not stated, in periods of the first mode.
+const MOST_PERIODS: f64 = 1e5;
+
 /// Tilt of the first axes of rotation against the axes of the body frame, about which a term may not act.
 const TILT: f64 = 0.1;
 
@@ -130,7 +133,7 @@ pub(super) fn sampled(
         Ok(traces) => traces.into_iter().map(|(trace, _)| trace).collect(),
         Err(error) if error.diagnostics().iter().all(|diagnostic| ends_a_run(diagnostic.code())) => {
             return Ok(Err(format!(
-                "a motion in these ranges has no end: {}",
+                "a motion in these ranges cannot be simulated: {}",
                 error.first_error().message()
             )));
         }
@@ -185,7 +188,7 @@ fn duration(body: &FlexBody, ranges: &Ranges) -> Option<f64> {
         return None;
     }
     let first_period = TAU / body.units().eigenvalue_of(lowest(body)).sqrt();
-    let longest = if ranges.deflection.is_some() { PERIODS * first_period } else { f64::INFINITY };
+    let longest = first_period * if ranges.deflection.is_some() { PERIODS } else { MOST_PERIODS };
     let turning = match ranges.spin_hz {
         0.0 => REVOLUTIONS * first_period,
         spin => REVOLUTIONS * TAU / body.units().eigenvalue_of(spin).sqrt(),
