@@ -243,7 +243,11 @@ impl<'a> AdviceFacts<'a> {
         terms.push(Term::new("Guideline", self.guideline_in_words()));
         terms.push(Term::new("Command", self.command.as_str()));
         let mut blocks = vec![
-            Block::Verdict { state: State::Given, head: format!("{}.", sentence(&kept)), rest: verdict },
+            Block::Verdict {
+                state: State::Given,
+                head: format!("{}.", sentence(&kept)),
+                rest: sentence(&verdict),
+            },
             Block::Terms(terms),
         ];
         if let Some(motions) = &self.motions {
