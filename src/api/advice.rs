@@ -36,11 +36,7 @@ impl Advice<'_> {
 
     /// Returns the groups of the kinetic energy that the motions need; without motions those with a size above the limit.
     pub fn groups(&self) -> Vec<&'static str> {
-        TermGroup::ALL
-            .into_iter()
-            .filter(|group| self.inner.groups().has(*group))
-            .map(TermGroup::name)
-            .collect()
+        self.inner.groups().kept().map(TermGroup::name).collect()
     }
 
     /// Returns the report of `flexbody advise` on the body in the file `path`, which its command names.

@@ -13,10 +13,7 @@ use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::ties::first_largest;
-use flexbody_motion::dynamics::Terms;
-use flexbody_motion::scene::{
-    Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Run, Scene, Scheme,
-};
+use flexbody_motion::scene::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Scene};
 use nalgebra::Matrix3;
 pub use ranges::Ranges;
 pub use sampled::{NotSampled, SampledMotions, SampledSet};
@@ -196,13 +193,6 @@ fn guideline(
 
 /// Returns a scene of ranges alone.
 fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>, first_rate: Option<f64>) -> Scene {
-    let run = Run {
-        duration: None,
-        outputs: 1,
-        most_steps: Run::MOST_STEPS,
-        scheme: Scheme::Adaptive { tolerance: 1e-9 },
-        terms: Terms::ALL,
-    };
     let requirements = Requirements {
         motion: MotionRange { angular_velocity: Some(Range::Any(spin)), ..MotionRange::default() },
         attachment: Attachment {
@@ -214,5 +204,5 @@ fn scene_of(spin: f64, deflection: f64, inertia: Matrix3<f64>, first_rate: Optio
         limits: Limits { deflection: Some(deflection), ..Limits::default() },
         ..Requirements::default()
     };
-    Scene { requirements, resolved: true, ..Scene::new("ranges", run) }
+    Scene { requirements, resolved: true, ..Scene::new("ranges", sampled::run(None, 1e-9)) }
 }

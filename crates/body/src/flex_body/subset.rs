@@ -254,8 +254,7 @@ impl Subset {
 
     /// Returns the groups in the form that [`Subset::parse_groups`] reads.
     pub fn groups_text(groups: TermGroups) -> String {
-        let names: Vec<&str> =
-            TermGroup::ALL.into_iter().filter(|group| groups.has(*group)).map(TermGroup::name).collect();
+        let names: Vec<&str> = groups.kept().map(TermGroup::name).collect();
         match names.len() {
             0 => "none".to_owned(),
             3 => "all".to_owned(),

@@ -244,6 +244,11 @@ impl TermGroups {
         Self { w1: self.w1, w2: self.w1 && self.w2, w3: self.w1 && self.w3 }
     }
 
+    /// Returns the groups of this set.
+    pub fn kept(self) -> impl Iterator<Item = TermGroup> {
+        TermGroup::ALL.into_iter().filter(move |group| self.has(*group))
+    }
+
     /// Returns the groups that are missing from this set.
     pub fn dropped(self) -> impl Iterator<Item = TermGroup> {
         TermGroup::ALL.into_iter().filter(move |group| !self.has(*group))

@@ -225,8 +225,7 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
     if body.invariants().general().is_some() {
         facts.push("general mass".to_owned());
     }
-    let groups = body.groups();
-    let without: Vec<&str> = TermGroup::ALL.iter().filter(|g| !groups.has(**g)).map(|g| g.name()).collect();
+    let without: Vec<&str> = body.groups().dropped().map(TermGroup::name).collect();
     if !without.is_empty() {
         facts.push(format!("without {}", without.join(" ")));
     }

@@ -378,7 +378,7 @@ impl<'a> AdviceFacts<'a> {
 }
 
 fn names(groups: TermGroups) -> Vec<&'static str> {
-    TermGroup::ALL.into_iter().filter(|group| groups.has(*group)).map(TermGroup::name).collect()
+    groups.kept().map(TermGroup::name).collect()
 }
 
 /// Returns the settings of multibody programs that compute at least these groups. The invariants of Adams are numbered 1

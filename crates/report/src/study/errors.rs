@@ -175,10 +175,9 @@ struct EnoughFacts {
 
 impl EnoughFacts {
     fn new(own: &EnoughParts, chosen: TermGroups) -> Self {
-        let terms = TermGroup::ALL.into_iter().filter(|group| own.groups.has(*group));
         Self {
             modes: own.modes,
-            terms: terms.map(TermGroup::name).collect(),
+            terms: own.groups.kept().map(TermGroup::name).collect(),
             has_more_terms: own.groups != chosen,
         }
     }

@@ -206,11 +206,7 @@ impl<'a> TrialFacts<'a> {
         Self {
             case: trial.case.and_then(|at| cases.get(at)).map(|case| case.name.as_str()),
             by_case: trial.by_case.iter().map(|worst| finite(*worst)).collect(),
-            kept: TermGroup::ALL
-                .into_iter()
-                .filter(|group| trial.kept.has(*group))
-                .map(TermGroup::name)
-                .collect(),
+            kept: trial.kept.kept().map(TermGroup::name).collect(),
             modes: trial.modes,
             multiplications: trial.multiplications,
             tier: trial.tier,

@@ -102,7 +102,7 @@ fn take(selection: &Selection) -> String {
     let numbers: Vec<usize> = selection.modes.iter().map(|j| j + 1).collect();
     let hertz = |j: Option<&usize>| j.map_or(0.0, |&j| selection.frequencies_hz[j]);
     let last = frequency(hertz(selection.modes.last()), 3);
-    let held: Vec<&str> = held_groups(selection).map(TermGroup::name).collect();
+    let held: Vec<&str> = selection.groups.kept().map(TermGroup::name).collect();
     let groups = groups_in_words(&held);
     if numbers.len() == selection.n_modes {
         return format!("all {} (up to {last}) with {groups}", counted(numbers.len(), "mode"));
@@ -113,10 +113,6 @@ fn take(selection: &Selection) -> String {
         counted(selection.n_modes, "mode"),
         ranges(&numbers)
     )
-}
-
-fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
-    TermGroup::ALL.into_iter().filter(|group| selection.groups.has(*group))
 }
 
 /// Decision about groups with the same reason.

@@ -1,7 +1,7 @@
 //! Motions sampled from ranges, and what the terms change in them.
 
 use super::ranges::Ranges;
-use crate::selection::{Case, PointRows, Trial, sets_in};
+use crate::selection::{Case, Trial, sets_in};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
@@ -11,7 +11,7 @@ use flexbody_motion::scene::{
     Axes, FramedScene, History, Initial, Measure, ModeStart, OutputErrors, PerQuantity, Requirements, Run,
     Scene, Scheme, Spin, Tolerance, Trace, VectorHistory, ends_a_run,
 };
-use nalgebra::{DVector, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -61,13 +61,13 @@ impl SampledSet {
     fn new(groups: TermGroups, trials: &[Trial]) -> Self {
         let errors: Option<Vec<OutputErrors>> = trials.iter().map(|trial| trial.errors).collect();
         let motion = first_largest(0..trials.len(), |at| trials[*at].worst).unwrap_or(0);
-        let remarks = trials.iter().map(|trial| trial.remark.clone());
+        let failed = trials.iter().find(|trial| !trial.remark.is_empty());
         Self {
             groups,
             errors: errors.and_then(|errors| errors.into_iter().reduce(OutputErrors::larger_of)),
             worst: trials.get(motion).map_or(0.0, |trial| trial.worst),
             motion,
-            remark: remarks.into_iter().find(|remark| !remark.is_empty()).unwrap_or_default(),
+            remark: failed.map_or_else(String::new, |trial| trial.remark.clone()),
         }
     }
 
@@ -187,7 +187,8 @@ fn duration(body: &FlexBody, ranges: &Ranges) -> Option<f64> {
     if ranges.spin_hz == 0.0 && ranges.deflection.is_none() {
         return None;
     }
-    let first_period = TAU / body.units().eigenvalue_of(lowest(body)).sqrt();
+    let softest = body.modes().eigenvalue.iter().copied().fold(f64::INFINITY, f64::min);
+    let first_period = TAU / softest.sqrt();
     let longest = first_period * if ranges.deflection.is_some() { PERIODS } else { MOST_PERIODS };
     let turning = match ranges.spin_hz {
         0.0 => REVOLUTIONS * first_period,
@@ -196,20 +197,15 @@ fn duration(body: &FlexBody, ranges: &Ranges) -> Option<f64> {
     Some(ranges.duration.unwrap_or(turning.min(longest)))
 }
 
-/// Returns the lowest frequency of the body. Unit: Hz.
-fn lowest(body: &FlexBody) -> f64 {
-    body.frequencies_hz().into_iter().fold(f64::INFINITY, f64::min)
+/// Returns a run with all terms, in which errors of the steps are below `tolerance`.
+pub(super) fn run(duration: Option<f64>, tolerance: f64) -> Run {
+    let (scheme, terms) = (Scheme::Adaptive { tolerance }, Terms::ALL);
+    Run { duration, outputs: 1, most_steps: Run::MOST_STEPS, scheme, terms }
 }
 
 fn scenes(body: &FlexBody, ranges: &Ranges, duration: f64) -> Vec<Scene> {
     let rate = body.units().eigenvalue_of(ranges.spin_hz).sqrt();
-    let run = Run {
-        duration: Some(duration),
-        outputs: 1,
-        most_steps: Run::MOST_STEPS,
-        scheme: Scheme::Adaptive { tolerance: TOLERANCE },
-        terms: Terms::ALL,
-    };
+    let run = run(Some(duration), TOLERANCE);
     let errors =
         PerQuantity { reaction: f64::INFINITY, recovery: f64::INFINITY, ..PerQuantity::all(ranges.limit) };
     let least_deflection = Some(LEAST_DEFLECTION * body.extent());
@@ -274,10 +270,12 @@ fn vibration(body: &FlexBody, at: usize, deflection: f64) -> Vec<ModeStart> {
         _ => (if at >> (mode % 4) & 1 == 0 { 1.0 } else { -1.0 }) * roots[0] / roots[mode],
     };
     let amplitudes: Vec<f64> = (0..few).map(amplitude).collect();
-    let rows = PointRows::new(body);
+    let shape = &body.modes().shape;
     let moved = |node: usize| {
-        let shape = rows.of_node(node);
-        (shape.columns(0, few) * DVector::from_column_slice(&amplitudes)).norm()
+        let along = |k: usize| {
+            amplitudes.iter().enumerate().map(|(mode, q)| q * shape[(3 * node + k, mode)]).sum::<f64>()
+        };
+        Vector3::from([along(0), along(1), along(2)]).norm()
     };
     let largest = (0..body.n_nodes()).map(moved).fold(0.0, f64::max);
     let start = |(mode, q): (usize, &f64)| ModeStart { mode, amplitude: q * deflection / largest, rate: 0.0 };

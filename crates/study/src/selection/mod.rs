@@ -30,7 +30,6 @@ pub(crate) use ranking::{fewest, first_of};
 pub use search::most_excited_modes;
 pub use select::{CaseSelection, Selection, rule_out, select, select_judged};
 pub use significance::{Significance, significances};
-pub(crate) use situation::PointRows;
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};
 #[cfg(feature = "hdf5")]

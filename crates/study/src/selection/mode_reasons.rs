@@ -11,7 +11,7 @@ use flexbody_linalg::ties::first_largest;
 use flexbody_motion::scene::{Load, VectorHistory, carrier_accelerations};
 use nalgebra::{DMatrix, Vector3};
 
-/// Number of modes, those of the largest contribution, whose excitation is told.
+/// Number of modes whose excitation is told. The modes of the largest contribution are told.
 const TOLD: usize = 3;
 
 /// Error over its tolerance whose source is not told.

@@ -390,13 +390,13 @@ fn is_about_centre(invariants: &Invariants) -> bool {
 // Displacements and rotations of points by the modes.
 
 /// Displacements of points of a body at rest by its modes.
-pub(crate) struct PointRows<'b> {
+pub(super) struct PointRows<'b> {
     body: &'b FlexBody,
     equations: EquationsOfMotion,
 }
 
 impl<'b> PointRows<'b> {
-    pub(crate) fn new(body: &'b FlexBody) -> Self {
+    pub(super) fn new(body: &'b FlexBody) -> Self {
         Self { body, equations: EquationsOfMotion::new(body, Terms::NONE) }
     }
 
@@ -428,7 +428,7 @@ impl<'b> PointRows<'b> {
     }
 
     /// Returns Psi of a node (3 x nf).
-    pub(crate) fn of_node(&self, node: usize) -> DMatrix<f64> {
+    pub(super) fn of_node(&self, node: usize) -> DMatrix<f64> {
         let shape = &self.body.modes().shape;
         DMatrix::from_fn(3, self.body.n_modes(), |k, j| shape[(3 * node + k, j)])
     }

@@ -105,7 +105,7 @@ impl Candidate {
 
     /// Returns the names of its groups.
     pub fn group_names(&self) -> Vec<&'static str> {
-        TermGroup::ALL.into_iter().filter(|group| self.groups.has(*group)).map(TermGroup::name).collect()
+        self.groups.kept().map(TermGroup::name).collect()
     }
 
     /// Returns the modes and groups of the source that the candidate keeps.

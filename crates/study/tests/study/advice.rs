@@ -62,7 +62,7 @@ fn the_centrifugal_load_is_kept_however_slowly_a_body_turns() {
     assert!((deflection(0.006) / deflection(0.003) - 4.0).abs() < 0.01);
 }
 
-/// What is left out of a body must not matter in motions of the ranges that were not sampled: ten axes of its own.
+/// Terms that are left out do not matter in motions of the ranges that were not sampled, here about ten other axes.
 #[test]
 fn advice_holds_in_motions_that_were_not_sampled() {
     let body = soft_block(6);
