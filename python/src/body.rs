@@ -641,27 +641,35 @@ impl Body {
     }
 
     /// Returns the body with some of its modes (numbers from 1, ascending; all by default) and groups of terms: "W1", "W2",
-    /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV". With `storage` "f32" its shapes and
+    /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV". `fixed_interface_modes` are the numbers
+    /// of those that a Craig-Bampton body keeps beside all motions of its interfaces; modes are then numbered anew. With `storage` "f32" its shapes and
     /// the inertia of its modes are rounded to 32-bit floats. Like `flexbody reduce`.
     #[pyo3(
         signature = (
             modes: "Sequence[int] | None" = None,
             terms: "str" = None,
             *,
+            fixed_interface_modes: "Sequence[int] | None" = None,
             storage: "Literal['f32'] | None" = None,
         ),
-        text_signature = "($self, modes=None, terms=\"all\", *, storage=None)"
+        text_signature = "($self, modes=None, terms=\"all\", *, fixed_interface_modes=None, storage=None)"
     )]
     fn subset(
         &self,
         py: Python<'_>,
         modes: Argument<'_, '_>,
         terms: Argument<'_, '_>,
+        fixed_interface_modes: Argument<'_, '_>,
         storage: Argument<'_, '_>,
     ) -> PyResult<Self> {
         let modes = modes.map(|given| counts(given, "modes")).transpose()?;
+        let fixed = fixed_interface_modes.map(|given| counts(given, "fixed_interface_modes")).transpose()?;
         let terms = terms.map_or_else(|| Ok("all".to_owned()), |terms| text(terms, "terms"))?;
-        let mut body = value(py, self.inner.subset(modes.as_deref(), &terms))?;
+        let whole = match fixed {
+            Some(numbers) => &value(py, self.inner.with_fixed_interface_modes(&numbers))?,
+            None => &self.inner,
+        };
+        let mut body = value(py, whole.subset(modes.as_deref(), &terms))?;
         if let Some(storage) = storage {
             called("storage", storage, &["f32"], |name| name)?;
             body = value(py, body.rounded_to_f32())?;

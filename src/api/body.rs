@@ -223,8 +223,21 @@ impl FlexBody {
     /// FB801 for unknown groups, and for modes that the body does not have; FB714 if an identity does not hold.
     pub fn subset(&self, modes: Option<&[usize]>, terms: &str) -> Result<FlexBody> {
         let modes = modes.map(|modes| Subset::modes_of(modes.to_vec())).transpose()?;
-        let subset = Subset { modes, groups: Subset::parse_groups(terms)? };
+        let subset = Subset { modes, groups: Subset::parse_groups(terms)?, ..Subset::default() };
         let made = self.0.clone().subset(&subset)?;
+        accept(&made)?;
+        Ok(FlexBody(made))
+    }
+
+    /// Returns a Craig-Bampton body with some of its fixed-interface modes and all motions of its interfaces, like `flexbody
+    /// reduce --fixed-interface-modes`.
+    ///
+    /// * `numbers`: numbers of the fixed-interface modes to keep, from 1, ascending; empty for none.
+    ///
+    /// # Errors
+    /// FB801 for another body, and for fixed-interface modes that the body does not have; FB714 if an identity does not hold.
+    pub fn with_fixed_interface_modes(&self, numbers: &[usize]) -> Result<FlexBody> {
+        let made = self.0.with_fixed_interface_modes(&Subset::modes_of(numbers.to_vec())?)?;
         accept(&made)?;
         Ok(FlexBody(made))
     }

@@ -171,6 +171,10 @@ pub struct StatedArguments {
     /// Numbers of the modes that the body keeps, instead of a selection: 1,3,5-9
     #[arg(long, value_name = "NUMBERS", conflicts_with = "split", help_heading = SCENE)]
     pub keep_modes: Option<String>,
+    /// With --basis craig-bampton: numbers of the fixed-interface modes that the body keeps beside all motions of its
+    /// interfaces, instead of a selection: 1,3,5-9 or none
+    #[arg(long, value_name = "NUMBERS", conflicts_with = "split", help_heading = SCENE)]
+    pub fixed_interface_modes: Option<String>,
     /// With --basis scene: number of shapes of the motion [default: the fewest that suffice]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = SCENE)]
     pub motion_shapes: Option<u32>,
@@ -183,7 +187,10 @@ pub struct StatedArguments {
 impl StatedArguments {
     /// Returns true if the command line states modes or terms.
     pub fn states_any(&self) -> bool {
-        self.terms.is_some() || self.keep_modes.is_some() || self.motion_shapes.is_some()
+        self.terms.is_some()
+            || self.keep_modes.is_some()
+            || self.fixed_interface_modes.is_some()
+            || self.motion_shapes.is_some()
     }
 }
 
@@ -206,6 +213,10 @@ pub struct ReduceArguments {
     /// Numbers of the modes to keep: 1,3,5-9 [default: all]
     #[arg(long, value_name = "NUMBERS")]
     pub keep_modes: Option<String>,
+    /// Numbers of the fixed-interface modes of a Craig-Bampton body to keep beside all motions of its interfaces: 1,3,5-9
+    /// or none [default: all]. Modes are then numbered anew
+    #[arg(long, value_name = "NUMBERS")]
+    pub fixed_interface_modes: Option<String>,
     /// Groups of terms to keep: W1, W2, W3 with commas, none, all, or the groups of a guideline of Witteveen and
     /// Pichler: I, II, III, IV [default: all]
     #[arg(long, value_name = "GROUPS")]

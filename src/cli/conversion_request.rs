@@ -78,25 +78,30 @@ fn stress_at(nodes: &str, count: usize) -> NodalStressSource {
 
 /// Returns the parts of the body that the command line states; `None` if it states none, so that a scene selects them.
 fn stated_parts(arguments: &StatedArguments) -> Result<Option<StatedParts>> {
-    let StatedArguments { terms, keep_modes, motion_shapes, enrichment } = arguments;
+    let StatedArguments { terms, keep_modes, fixed_interface_modes, motion_shapes, enrichment } = arguments;
     let is_fine = *enrichment == EnrichmentName::Fine;
     if !arguments.states_any() {
         if is_fine {
-            let message = "--enrichment fine needs --terms, --keep-modes or --motion-shapes: a selection takes the standard one";
+            let message = "--enrichment fine needs --terms, --keep-modes, --fixed-interface-modes or --motion-shapes: a selection takes the standard one";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         return Ok(None);
     }
     Ok(Some(StatedParts {
         motion_shapes: motion_shapes.map(|count| count as usize),
-        subset: subset(terms.as_deref(), keep_modes.as_deref())?,
+        subset: subset(terms.as_deref(), keep_modes.as_deref(), fixed_interface_modes.as_deref())?,
         is_fine,
     }))
 }
 
 /// Parses the modes and groups of terms that a command line states.
-pub(super) fn subset(terms: Option<&str>, keep_modes: Option<&str>) -> Result<Subset> {
+pub(super) fn subset(
+    terms: Option<&str>,
+    keep_modes: Option<&str>,
+    fixed_interface_modes: Option<&str>,
+) -> Result<Subset> {
     Ok(Subset {
+        fixed_interface_modes: fixed_interface_modes.map(Subset::parse_some_modes).transpose()?,
         modes: keep_modes.map(Subset::parse_modes).transpose()?,
         groups: terms.map(Subset::parse_groups).transpose()?.unwrap_or_default(),
     })

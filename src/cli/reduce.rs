@@ -7,15 +7,16 @@ use super::run::{Printed, Run};
 use super::terminal::body_text;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Storage};
+use flexbody_body::flex_body::{FlexBody, Storage, Subset};
 use flexbody_body::verification::accept;
 use flexbody_motion::dynamics::indefinite_inertia;
 use flexbody_report::{Facts, Format, render};
 
 pub(super) fn run(arguments: &ReduceArguments) -> Result<Outcome> {
-    let subset = subset(arguments.terms.as_deref(), arguments.keep_modes.as_deref())?;
-    if arguments.keep_modes.is_none() && arguments.terms.is_none() && arguments.storage.is_none() {
-        let message = "nothing is left out: neither --keep-modes, --terms nor --storage is given";
+    let ReduceArguments { terms, keep_modes, fixed_interface_modes, storage, .. } = arguments;
+    let subset = subset(terms.as_deref(), keep_modes.as_deref(), fixed_interface_modes.as_deref())?;
+    if subset == Subset::default() && terms.is_none() && storage.is_none() {
+        let message = "nothing is left out: neither --keep-modes, --fixed-interface-modes, --terms nor --storage is given";
         let help = "name the modes or terms to keep, as in --keep-modes 1,3,5-9 --terms W1";
         return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
     }

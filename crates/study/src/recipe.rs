@@ -100,22 +100,18 @@ pub fn selected_from_model(selection: &Selection, origin: &Origin, modes: Option
     if let Some(modes) = modes {
         words.extend(text(["--modes", &modes.to_string()]));
     }
-    words.extend(subset_words(&subset_of(selection), selection.n_modes, true));
+    words.extend(subset_words(&selection.subset(), selection.n_modes, true));
     command("convert", &origin.input, words, Storage::F64)
 }
 
 /// Returns the command that makes the body of a selection from the flex-body file that it was made for.
 pub fn selected_from_file(selection: &Selection, origin: &Origin) -> String {
-    reduction(origin, &subset_of(selection), selection.n_modes, Storage::F64)
-}
-
-fn subset_of(selection: &Selection) -> Subset {
-    Subset { modes: Some(selection.modes.clone()), groups: selection.groups }
+    reduction(origin, &selection.subset(), selection.n_modes, Storage::F64)
 }
 
 /// Returns the command that makes the body of an advice from its flex-body file.
 pub fn advised(file: &str, groups: TermGroups) -> String {
-    let subset = Subset { modes: None, groups };
+    let subset = Subset { groups, ..Subset::default() };
     command("reduce", &[file.to_owned()], subset_words(&subset, 0, true), Storage::F64)
 }
 
@@ -137,9 +133,11 @@ fn scene_words(origin: &Origin) -> Vec<String> {
 /// Returns the options that state the subset of `n_modes` modes. The terms are stated even if the body has all of them
 /// if `states_terms`: `convert` with a scene would select them otherwise, and `reduce` needs something to do.
 fn subset_words(subset: &Subset, n_modes: usize, states_terms: bool) -> Vec<String> {
+    let fixed = subset.fixed_interface_modes.as_ref();
+    let fixed = fixed.map(|modes| text(["--fixed-interface-modes", &Subset::some_modes_text(modes)]));
     let some = subset.modes.as_ref().filter(|modes| modes.len() < n_modes);
-    let mut words: Vec<String> =
-        some.iter().flat_map(|modes| text(["--keep-modes", &Subset::modes_text(modes)])).collect();
+    let some = some.map(|modes| text(["--keep-modes", &Subset::modes_text(modes)]));
+    let mut words: Vec<String> = fixed.into_iter().chain(some).flatten().collect();
     if states_terms || subset.groups != TermGroups::ALL {
         words.extend(text(["--terms", &Subset::groups_text(subset.groups)]));
     }
@@ -165,7 +163,7 @@ mod tests {
     #[test]
     fn the_whole_body_is_stated() {
         let origin = Origin { input: vec!["a b.h5".to_owned()], scene: "s.toml".to_owned(), case: None };
-        let all = Subset { modes: Some(vec![0, 1]), groups: TermGroups::ALL };
+        let all = Subset { modes: Some(vec![0, 1]), ..Subset::default() };
         let command = Recipe::File.command(&origin, &all, 2, Storage::F64);
         assert_eq!(command, "flexbody reduce 'a b.h5' --terms all -o body.flex.h5");
         assert_eq!(advised("a.h5", TermGroups::NONE), "flexbody reduce a.h5 --terms none -o body.flex.h5");

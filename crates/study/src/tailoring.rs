@@ -279,8 +279,7 @@ pub fn convert_for(
     let Enriched { made: mut conversion, rounds } = enriched;
     let varied_reference_errors = varied_errors(model, &conversion.body, cases, context)?;
     let selection = select_judged(&conversion.body, &rounds, &varied_reference_errors, cases, context)?;
-    let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
-    conversion.body = with_sources(reduced, cases)?;
+    conversion.body = with_sources(selection.body(&conversion.body)?, cases)?;
     Ok((conversion, selection))
 }
 

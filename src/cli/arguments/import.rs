@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Args)]
 pub struct ForeignArguments {
     /// Convert the body in a file of another program instead of making one from a model
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "split", "terms", "keep_modes", "motion_shapes", "allow_implausible", "keep_soft_rotations", "like", "mesh_triangles", "no_mesh", "format", "matrices", "dimension", "interface", "damping", "geometric_stiffness", "stress"], help_heading = MODEL)]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "split", "terms", "keep_modes", "fixed_interface_modes", "motion_shapes", "allow_implausible", "keep_soft_rotations", "like", "mesh_triangles", "no_mesh", "format", "matrices", "dimension", "interface", "damping", "geometric_stiffness", "stress"], help_heading = MODEL)]
     pub from: Option<String>,
 }
 

@@ -68,10 +68,7 @@ pub const OPEN: [&str; 3] = ["largest deflection of the body", "percentages of F
 /// * The possible effect of loads on a free body until the end of its motion grows if the motion ends later.
 /// * The largest rows of a motion lie between the instants of its table.
 /// * Motion between the standard variations and the end lasts longer, too.
-/// * FB546 estimates by the upper half of the modes of the file, which are others in another frame.
-pub const CHANGED: [(&str, &str); 8] = [
-    ("FB546", "another frame"),
-    ("findings", "another frame"),
+pub const CHANGED: [(&str, &str); 6] = [
     ("errors of the selected body", "start later"),
     ("largest of", "recover the table"),
     ("significances", "start later"),

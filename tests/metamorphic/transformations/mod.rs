@@ -66,7 +66,7 @@ const fn of(name: &'static str, reach: Reach, apply: Apply) -> Transformation {
 }
 
 /// All transformations.
-pub const ALL: [Transformation; 23] = [
+pub const ALL: [Transformation; 24] = [
     of("turn the world", Reach::Scene, world::turn),
     of("shift the world", Reach::Scene, world::shift),
     of("boost the world", Reach::Scene, world::boost),
@@ -90,4 +90,5 @@ pub const ALL: [Transformation; 23] = [
     of("start from a state", Reach::Simulation, scene::restart),
     of("repeat a case", Reach::Scene, scene::repeat),
     of("more outputs", Reach::Scene, scene::outputs),
+    of("watch more", Reach::Simulation, scene::watch),
 ];

@@ -210,14 +210,21 @@ pub fn repeat(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Records more times and more points.
+/// Records more times.
 pub fn outputs(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let finer = 2 + pick(random, 4);
     let mut changed = subject.clone();
     changed.scene.run.outputs *= finer;
-    let root = Point::Interface("root".to_owned());
-    if !changed.scene.watched.contains(&root) {
-        changed.scene.watched.push(root);
-    }
     Ok(Some(Pair::new(subject, changed, Correspondence { finer, ..Correspondence::default() })))
+}
+
+/// Watches one more point, which a verdict would count among its deflections.
+pub fn watch(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
+    let root = Point::Interface("root".to_owned());
+    if subject.scene.watched.contains(&root) {
+        return Ok(None);
+    }
+    let mut changed = subject.clone();
+    changed.scene.watched.push(root);
+    Ok(Some(Pair::new(subject, changed, Correspondence::default())))
 }

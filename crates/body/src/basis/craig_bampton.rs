@@ -388,7 +388,7 @@ impl<'a> Parts<'a> {
         subtract_combination(left.as_mut(), self.constraint.as_ref(), q.as_ref());
         let y = self.elimination.free_rows(left.as_ref());
         let eta = gram(self.fixed.vectors.as_ref(), self.reduced.pencil().apply_mass(y.as_ref()).as_ref());
-        let modal = (1..=lambda.len()).map(|j| format!("fixed-interface mode {j}"));
+        let modal = (1..=lambda.len()).map(InterfaceCoordinates::amplitude);
         let coordinates = InterfaceCoordinates {
             names: self.names.iter().cloned().chain(modal).collect(),
             stiffness: Mat::from_fn(size, size, |i, j| match (i < c, j < c) {

@@ -269,6 +269,11 @@ impl InterfaceCoordinates {
         amplitudes.map(|(j, _)| self.stiffness[(j, j)] / self.mass[(j, j)]).collect()
     }
 
+    /// Returns the name of the amplitude of the fixed-interface mode with this number, from 1.
+    pub(crate) fn amplitude(number: usize) -> String {
+        format!("fixed-interface mode {number}")
+    }
+
     /// Returns true if the coordinate of this name is the amplitude of a fixed-interface mode.
     pub fn is_amplitude(name: &str) -> bool {
         name.starts_with("fixed-interface mode ")

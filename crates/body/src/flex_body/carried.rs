@@ -20,6 +20,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::about_percent;
+use flexbody_linalg::combine;
 use flexbody_model::{Coupling, rigid_count};
 use nalgebra::{Matrix3, Vector3};
 
@@ -125,23 +126,26 @@ impl FlexBody {
     /// Returns a warning if the modes of a carried body leave more than one hundredth of its static
     /// response to accelerations of the interface unresolved.
     ///
-    /// The estimate is the contribution of the upper half of the modes to the elastic energy. With free
-    /// modes the energy converges like the inverse of their number, so the missing part is about as large.
+    /// The estimate is the contribution of the upper half of the held modes to the elastic energy. With free
+    /// modes the energy converges like the inverse of their number, so the missing part is about as large. The
+    /// held modes of (K_ff, m_ff) depend on the span of the modes alone, not on the frame of the file.
     /// Residual vectors of the interface and a Craig-Bampton basis with it need no warning.
     pub fn unresolved(&self, carrier: &Carrier, original: &Self) -> Option<Diagnostic> {
         if original.resolves(carrier) {
             return None;
         }
-        let (stiffness, c1, c2) =
-            (self.invariants().modal_stiffness(), self.invariants().c1(), self.invariants().c2());
-        let nf = self.n_modes();
+        let (values, vectors) = self.eigenpairs_in_frame()?;
+        let nf = values.len();
         let energy = |loads: &Mat<f64>, modes: std::ops::Range<usize>| {
             Matrix3::from_fn(|a, b| {
-                modes.clone().map(|j| loads[(a, j)] * loads[(b, j)] / stiffness[(j, j)]).sum::<f64>()
+                modes.clone().map(|j| loads[(a, j)] * loads[(b, j)] / values[j]).sum::<f64>()
             })
         };
-        let missing = |loads: &Mat<f64>| largest_ratio(&energy(loads, nf / 2..nf), &energy(loads, 0..nf));
-        let worst = missing(c1).max(missing(&c2));
+        let missing = |loads: &Mat<f64>| {
+            let held = combine(loads.as_ref(), vectors.as_ref());
+            largest_ratio(&energy(&held, nf / 2..nf), &energy(&held, 0..nf))
+        };
+        let worst = missing(self.invariants().c1()).max(missing(&self.invariants().c2()));
         (worst > MAX_TRUNCATION).then(|| {
             let message = format!(
                 "the {nf} modes resolve {carrier} poorly: when it is accelerated, up to about {} of the elastic energy is missing, depending on the direction",

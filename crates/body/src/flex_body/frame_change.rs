@@ -119,7 +119,7 @@ impl FlexBody {
     }
 
     /// Returns the body after a change of its modes.
-    fn changed(&self, change: &ModalChange, conditions: ReferenceConditions) -> Result<Self> {
+    pub(super) fn changed(&self, change: &ModalChange, conditions: ReferenceConditions) -> Result<Self> {
         let mut parts = self.parts().clone();
         let invariants = change.invariants(&parts.invariants);
         parts.modes = self.changed_modes(change, &invariants);

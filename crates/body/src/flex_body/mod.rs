@@ -4,6 +4,7 @@ mod body;
 mod carried;
 mod carried_stiffness;
 mod carrier;
+mod fewer_fixed_modes;
 mod frame_change;
 mod held_modes;
 mod held_response;

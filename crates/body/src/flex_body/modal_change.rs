@@ -177,6 +177,16 @@ impl ModalChange {
         Ok(Self { modes, taken: None, left_out: split.rigid_motions })
     }
 
+    /// Returns the change to normalised modes in the span of `basis` (nf x nf'), orthonormal combinations of modes in the
+    /// present frame whose mass is the unit matrix.
+    ///
+    /// # Errors
+    /// A text with the reason: a stiffness that is not positive.
+    pub(super) fn in_span(invariants: &Invariants, basis: &Mat<f64>) -> Result<Self, String> {
+        let modes = eigenmodes(invariants, basis)?;
+        Ok(Self { modes, taken: None, left_out: RigidMotions::default() })
+    }
+
     /// Returns the rigid motion (6 x nf) that is removed from each old mode; `None` if none is.
     pub(super) fn taken(&self) -> Option<&Mat<f64>> {
         self.taken.as_ref()

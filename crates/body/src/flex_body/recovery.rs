@@ -146,7 +146,16 @@ impl Recovery {
         Self { motion: self.motion.iter().map(of_motion).collect(), ..self.clone() }
     }
 
-    /// Returns the recovery after a change of the modes, for rows that rigid motion does not change.
+    /// Returns the recovery of the modes `kept` (indices, ascending) alone.
+    pub(super) fn of_modes(&self, kept: &[usize]) -> Self {
+        Self {
+            modes: Mat::from_fn(self.rows.len(), kept.len(), |i, j| self.modes[(i, kept[j])]),
+            motion: self.motion.iter().map(|one| one.of_modes(kept)).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Returns the recovery after a change of the modes. Rows that rigid motion changes need a change that takes none.
     pub(super) fn with_modes(&self, change: &ModalChange) -> Self {
         let turned = change.taken().map(|taken| taken.as_ref().subrows(3, 3).to_owned());
         let combined = |rows: &Mat<f64>| change.combined(rows);

@@ -1,7 +1,7 @@
 //! Static response of the modes of a body to the loads of its recoveries, and the recoveries of fewer modes, whose static
 //! columns take over the response of the others.
 
-use super::modal_change::{RigidCoupling, stacked};
+use super::modal_change::{ModalChange, RigidCoupling, stacked};
 use super::motion_columns::modal_forces;
 use super::{
     FlexBody, Interface, LOAD_COMPONENTS, LoadColumns, LoadKind, MotionLoad, NamedLoad, Recovery, TermGroups,
@@ -40,57 +40,67 @@ pub struct StaticCoordinates {
 }
 
 impl FlexBody {
-    /// Returns the recoveries of this body after a reduction to the modes `kept` (indices, ascending) and the `groups`:
-    /// static columns take over what the dropped modes contributed to the static response, so that rows under constant
-    /// loads and constant spin do not change. A body that loses W1 has no modal response to spin.
+    /// Returns the recoveries of this body after a reduction to the modes `kept` (indices, ascending) and the `groups`.
     pub(super) fn reduced_recoveries(&self, kept: &[usize], groups: TermGroups) -> Vec<Recovery> {
-        let recoveries = &self.parts().recoveries;
+        let nf = self.n_modes();
+        if kept.len() == nf && self.groups() == groups {
+            return self.recoveries().to_vec();
+        }
+        // The stiffness of modes is diagonal: each takes its own flexibility with it.
+        let stiffness = self.invariants().modal_stiffness();
+        let is_lost = |j: usize| kept.binary_search(&j).is_err();
+        let lost =
+            Mat::from_fn(nf, nf, |i, j| if i == j && is_lost(j) { 1.0 / stiffness[(j, j)] } else { 0.0 });
+        self.taking_over(&lost, groups, |recovery| recovery.of_modes(kept))
+    }
+
+    /// Returns the recoveries of this body after a change of its modes, by which these lose the static flexibility `lost`
+    /// (nf x nf).
+    pub(super) fn combined_recoveries(&self, change: &ModalChange, lost: &Mat<f64>) -> Vec<Recovery> {
+        self.taking_over(lost, self.groups(), |recovery| recovery.with_modes(change))
+    }
+
+    /// Returns the recoveries of a body with other modes, `of_others`, and the `groups`: static columns take over what the
+    /// flexibility `lost` (nf x nf) contributed to the static response, so that rows under constant loads and constant spin
+    /// do not change. A body that loses W1 has no modal response to spin.
+    fn taking_over(
+        &self,
+        lost: &Mat<f64>,
+        groups: TermGroups,
+        of_others: impl Fn(&Recovery) -> Recovery,
+    ) -> Vec<Recovery> {
+        let recoveries = self.recoveries();
         if recoveries.is_empty() {
             return Vec::new();
         }
-        let nf = self.n_modes();
-        let dropped: Vec<usize> = (0..nf).filter(|j| kept.binary_search(j).is_err()).collect();
-        let all: Vec<usize> = (0..nf).collect();
-        let loses_w1 = self.groups().w1 && !groups.w1;
-        if dropped.is_empty() && self.groups() == groups {
-            return recoveries.clone();
-        }
+        let (nf, stiffness) = (self.n_modes(), self.invariants().modal_stiffness());
+        let whole = Mat::from_fn(nf, nf, |i, j| if i == j { 1.0 / stiffness[(j, j)] } else { 0.0 });
+        let of_spin = if self.groups().w1 && !groups.w1 { &whole } else { lost };
         let loads = self.modal_loads();
-        let take_over = |one: &Recovery, columns: &mut Mat<f64>, load: &Mat<f64>, from: &[usize]| {
-            let response = self.static_response(load, from);
-            for i in 0..columns.nrows() {
-                for c in 0..columns.ncols() {
-                    columns[(i, c)] += from
-                        .iter()
-                        .enumerate()
-                        .map(|(p, &j)| one.modes[(i, j)] * response[(p, c)])
-                        .sum::<f64>();
-                }
-            }
+        let take_over = |recovery: &Recovery, columns: &mut Mat<f64>, load: &Mat<f64>, from: &Mat<f64>| {
+            *columns += &recovery.modes * (from * load);
         };
-        let reduced = |recovery: &Recovery| {
-            let mut new = recovery.clone();
-            new.modes = Mat::from_fn(recovery.rows.len(), kept.len(), |i, j| recovery.modes[(i, kept[j])]);
+        let taken = |recovery: &Recovery| {
+            let mut own = recovery.clone();
             if let Some(spin) = &loads.spin {
-                take_over(recovery, &mut new.spin, spin, if loses_w1 { &all } else { &dropped });
+                take_over(recovery, &mut own.spin, spin, of_spin);
             }
-            take_over(recovery, &mut new.named, &loads.named, &dropped);
-            for of_motion in &mut new.motion {
+            take_over(recovery, &mut own.named, &loads.named, lost);
+            for of_motion in &mut own.motion {
                 let responded = loads.motion.iter().find(|(load, _)| *load == of_motion.load);
                 if let Some((load, force)) = responded {
-                    let from = if modes_respond(*load, groups) { &dropped } else { &all };
+                    let from = if modes_respond(*load, groups) { lost } else { &whole };
                     take_over(recovery, &mut of_motion.columns, force, from);
                 }
-                *of_motion = of_motion.of_modes(kept);
             }
-            for at in &mut new.loads {
+            for at in &mut own.loads {
                 if let Some((_, load)) = loads.at_interfaces.iter().find(|(name, _)| *name == at.interface) {
-                    take_over(recovery, &mut at.columns, load, &dropped);
+                    take_over(recovery, &mut at.columns, load, lost);
                 }
             }
-            new
+            of_others(&own)
         };
-        recoveries.iter().map(reduced).collect()
+        recoveries.iter().map(taken).collect()
     }
 
     /// Returns the rows of a recovery under constant unit loads, modes and static columns together, along the axes of the

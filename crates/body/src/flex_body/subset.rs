@@ -178,7 +178,10 @@ const GUIDELINES: [(&str, TermGroups); 4] = [
 /// Modes and groups of the kinetic energy that a body keeps.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Subset {
-    /// Indices of the modes (from 0, ascending); `None` for all.
+    /// Indices of the fixed-interface modes of a Craig-Bampton body (from 0, ascending), beside all motions of its
+    /// interfaces; `None` for all.
+    pub fixed_interface_modes: Option<Vec<usize>>,
+    /// Indices of the modes (from 0, ascending), of those that the fixed-interface modes leave; `None` for all.
     pub modes: Option<Vec<usize>>,
     /// Groups of the kinetic energy; groups that the body does not hold stay missing.
     pub groups: TermGroups,
@@ -205,6 +208,19 @@ impl Subset {
             numbers.extend(first..=last);
         }
         Self::modes_of(numbers)
+    }
+
+    /// Parses numbers as [`Subset::parse_modes`] does, or `none` for no mode at all.
+    ///
+    /// # Errors
+    /// The errors of [`Subset::parse_modes`].
+    pub fn parse_some_modes(text: &str) -> Result<Vec<usize>> {
+        if text.trim().eq_ignore_ascii_case("none") { Ok(Vec::new()) } else { Self::parse_modes(text) }
+    }
+
+    /// Returns the modes in the form that [`Subset::parse_some_modes`] reads.
+    pub fn some_modes_text(modes: &[usize]) -> String {
+        if modes.is_empty() { "none".to_owned() } else { Self::modes_text(modes) }
     }
 
     /// Returns the ascending indices (from 0) of modes that are given by their numbers, from 1.
@@ -276,6 +292,10 @@ impl FlexBody {
     /// # Errors
     /// [`Usage`](Code::Usage) if the body has fewer modes; the errors of [`FlexBody::new`].
     pub fn subset(self, subset: &Subset) -> Result<Self> {
+        if let Some(kept) = &subset.fixed_interface_modes {
+            let others = Subset { fixed_interface_modes: None, ..subset.clone() };
+            return self.with_fixed_interface_modes(kept)?.subset(&others);
+        }
         let all: Vec<usize> = (0..self.n_modes()).collect();
         let modes = subset.modes.as_deref().unwrap_or(&all);
         if let Some(beyond) = modes.iter().find(|mode| **mode >= all.len()) {

@@ -29,7 +29,7 @@ fn arrays(invariants: &Invariants) -> Vec<Mat<f64>> {
 }
 
 fn with_groups(body: &FlexBody, groups: TermGroups) -> FlexBody {
-    body.clone().subset(&Subset { modes: None, groups }).expect("a body")
+    body.clone().subset(&Subset { groups, ..Subset::default() }).expect("a body")
 }
 
 /// Sets of groups of which a carried body loses none: W2 and W3 beside W1.

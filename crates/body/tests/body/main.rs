@@ -15,6 +15,7 @@ mod deck_names;
 mod empty_rows;
 mod errata;
 mod extremes;
+mod fewer_fixed_modes;
 mod first_shift;
 mod followers;
 mod held_modes;

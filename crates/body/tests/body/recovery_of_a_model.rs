@@ -37,6 +37,16 @@ fn static_rows_depend_neither_on_the_modes_nor_on_the_frame() {
             );
         }
     }
+    // Also without some of the fixed-interface modes of a Craig-Bampton basis.
+    let coupled = made(BasisChoice::CraigBampton(CraigBampton), 6, BodyFrame::Com);
+    for kept in [vec![0, 1, 4], Vec::new()] {
+        let fewer = coupled.with_fixed_interface_modes(&kept).expect("a body");
+        let found = fewer.static_rows(&fewer.recoveries()[0]);
+        assert!((&found.spin - &expected.spin).norm_max() < 1e-8 * size(&expected.spin), "{kept:?}");
+        for (own, known) in found.loads.iter().zip(&expected.loads) {
+            assert!((&own.columns - &known.columns).norm_max() < 1e-8 * size(&known.columns), "{kept:?}");
+        }
+    }
     // With fewer modes the columns hold more.
     let part = |modes: usize| {
         let body = made(free(), modes, BodyFrame::Com);

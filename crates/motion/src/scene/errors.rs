@@ -10,9 +10,6 @@ use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{larger, not_negative};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Torque, relative to the energy of the motion, below which it counts as rounding.
-const NO_TORQUE: f64 = 1e-10;
-
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not compared.
 pub const LEAST_REACTION: f64 = 1e-3;
 
@@ -185,7 +182,7 @@ pub fn reaction_errors(
     let of_part = |k: usize| {
         let (part, lever) = (parts[k], levers[k]);
         // Forces below rounding count as zero for any limit.
-        if largest[k] <= NO_TORQUE * extremes.internal / lever {
+        if largest[k] <= extremes.rounding / lever {
             return None;
         }
         // Force and torque in units of torque: each is compared only above a part of the other.

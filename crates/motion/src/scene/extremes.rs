@@ -10,6 +10,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Number of roundings of the largest total energy below which differences of energies count as rounding.
 const ROUNDINGS: f64 = 16.0;
 
+/// Torque, or force times a length, relative to the internal energy, below which it counts as rounding.
+const NO_TORQUE: f64 = 1e-10;
+
 /// Largest values of all quantities over a continuous motion: at the steps of the integration, at points
 /// within them, and between these points. The values do not depend on the output times of the scene.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -24,6 +27,8 @@ pub struct Extremes {
     pub elastic: f64,
     /// Largest internal energy: kinetic energy without that of translation, plus elastic energy.
     pub internal: f64,
+    /// Torque, or force times a length, that counts as rounding.
+    pub rounding: f64,
     /// Largest angular velocity |omega|.
     pub spin: f64,
     /// Largest components |omega_k| of the angular velocity along the body axes.
@@ -34,6 +39,14 @@ pub struct Extremes {
     pub reaction: (f64, f64),
     /// Drift of conserved quantities.
     pub drift: Drift,
+}
+
+impl Extremes {
+    /// Returns the torque, or force times a length, that counts as rounding beside the largest internal energy and the largest
+    /// energy with that of translation: a carrier in pure translation exerts nothing else.
+    pub fn rounding_of(internal: f64, total: f64) -> f64 {
+        NO_TORQUE * internal + ROUNDINGS * f64::EPSILON * total
+    }
 }
 
 /// Drift of conserved quantities: largest differences over the motion, dimensionless.
@@ -138,6 +151,7 @@ impl<'b> Survey<'b> {
             amplitudes: self.amplitudes.iter().map(|peak| peak.value).collect(),
             elastic: self.elastic.value.powi(2),
             internal,
+            rounding: Extremes::rounding_of(internal, self.differences.total),
             spin: self.spin.value,
             spin_body: Vector3::from(self.spin_body.map(|peak| peak.value)),
             spins: self.spins.0,

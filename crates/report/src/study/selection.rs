@@ -78,6 +78,8 @@ struct TermFacts<'a> {
 
 #[derive(Debug, Clone, Serialize)]
 struct ModesFacts<'a> {
+    /// Fixed-interface modes that a Craig-Bampton body keeps; `None` if the selection picks modes.
+    fixed_interface: Option<FixedInterfaceFacts>,
     of: usize,
     /// Numbers of the kept modes, from 1.
     kept: Vec<usize>,
@@ -86,6 +88,13 @@ struct ModesFacts<'a> {
     reasons: Option<ModeReasonFacts<'a>>,
     static_responses: Vec<ResponseFacts<'a>>,
     shares: Vec<ShareFacts>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct FixedInterfaceFacts {
+    of: usize,
+    /// Numbers of the kept ones, from 1.
+    kept: Vec<usize>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -269,6 +278,10 @@ impl<'a> SelectionFacts<'a> {
             terms: selection.terms.iter().zip(&selection.decisive_errors).map(term).collect(),
             guideline: selection.guideline,
             modes: ModesFacts {
+                fixed_interface: selection.fixed_interface.as_ref().map(|choice| FixedInterfaceFacts {
+                    of: choice.of,
+                    kept: choice.kept.iter().map(|j| j + 1).collect(),
+                }),
                 of: selection.n_modes,
                 kept: selection.modes.iter().map(|j| j + 1).collect(),
                 reason: &selection.mode_reason,
@@ -480,10 +493,11 @@ impl<'a> SelectionFacts<'a> {
             .collect();
         let of_recovery =
             if with_recoveries { "; contribution to the recoveries, over their limits" } else { "" };
+        let noun = if self.modes.fixed_interface.is_some() { "Fixed-interface modes" } else { "Modes" };
         let caption = format!(
-            "Modes with the largest contributions ({} of {}): largest amplitude, and deflection and stress of the mode alone relative to all modes together{of_recovery}.",
+            "{noun} with the largest contributions ({} of {}): largest amplitude, and deflection and stress of the mode alone relative to all modes together{of_recovery}.",
             shares.len(),
-            self.modes.of
+            self.modes.shares.len()
         );
         let text = [heads.len() - 1];
         Table::new(caption, heads, &text, shares.iter().map(row).collect())

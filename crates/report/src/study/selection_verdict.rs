@@ -104,6 +104,18 @@ fn take(selection: &Selection) -> String {
     let last = frequency(hertz(selection.modes.last()), 3);
     let held: Vec<&str> = selection.groups.kept().map(TermGroup::name).collect();
     let groups = groups_in_words(&held);
+    if let Some(choice) = &selection.fixed_interface {
+        let kept: Vec<usize> = choice.kept.iter().map(|j| j + 1).collect();
+        let kept = match kept.as_slice() {
+            [] => "none".to_owned(),
+            kept => format!("{} ({})", kept.len(), ranges(kept)),
+        };
+        return format!(
+            "{} (up to {last}): all motions of the interfaces and {kept} of {} fixed-interface modes, with {groups}",
+            counted(numbers.len(), "mode"),
+            choice.of
+        );
+    }
     if numbers.len() == selection.n_modes {
         return format!("all {} (up to {last}) with {groups}", counted(numbers.len(), "mode"));
     }

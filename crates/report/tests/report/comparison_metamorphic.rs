@@ -173,7 +173,7 @@ fn a_body_with_its_frame_on_an_interface_agrees_with_one_in_mean_axes() {
     );
     // Without W3 the change to mean axes is not known.
     let groups = TermGroups::without(TermGroup::W3);
-    let decision = Subset { modes: None, groups };
+    let decision = Subset { groups, ..Subset::default() };
     let partial = held.clone().subset(&decision).expect("a body");
     let refused = compare(&free, &partial, &Tolerances::default()).expect_err("no mean axes").to_string();
     assert!(refused.contains("W3") && refused.contains("--frame"), "{refused}");
@@ -231,7 +231,7 @@ fn dropped_groups_differ() {
     let body = converted(BodyFrame::Com);
     for group in TermGroup::ALL {
         let groups = TermGroups::without(group);
-        let subset = Subset { modes: None, groups };
+        let subset = Subset { groups, ..Subset::default() };
         let partial = body.clone().subset(&subset).expect("a body");
         let quantity = format!("{} of one body", group.name());
         for found in compared(&body, &partial) {

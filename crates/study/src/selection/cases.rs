@@ -2,6 +2,7 @@
 
 use super::bounds::Variation;
 use super::norms::Norms;
+use super::shapes::FixedInterfaceModes;
 use super::situation::Situation;
 use super::trial::{Trial, TrialRuns};
 use flexbody_base::error::Result;
@@ -81,6 +82,7 @@ pub(crate) struct Case<'c> {
     pub situation: Situation,
     loads: Vec<BodyPoint>,
     watched: Vec<BodyPoint>,
+    fixed: Option<&'c FixedInterfaceModes<'c>>,
     context: Context<'c>,
 }
 
@@ -88,7 +90,12 @@ impl<'c> Case<'c> {
     pub(crate) fn new(body: &'c FlexBody, scene: &'c Scene, context: &Context<'c>) -> Result<Self> {
         let (loads, watched) = points_of(body, scene)?;
         let situation = Situation::new(body, scene, &loads);
-        Ok(Self { body, scene, situation, loads, watched, context: *context })
+        Ok(Self { body, scene, situation, loads, watched, fixed: None, context: *context })
+    }
+
+    /// Returns the case of a Craig-Bampton body whose fixed-interface modes may be left out.
+    pub(super) fn with_fixed(self, fixed: Option<&'c FixedInterfaceModes<'c>>) -> Self {
+        Self { fixed, ..self }
     }
 
     /// Returns norms of the terms at tier 0 and, if `tier_1` is set and the body holds all groups, at tier 1. Empty if
@@ -103,8 +110,8 @@ impl<'c> Case<'c> {
     }
 
     pub(crate) fn runs(&self) -> TrialRuns<'_> {
-        let Self { body, scene, situation, loads, watched, context } = self;
-        TrialRuns { body, scene, situation, loads, watched, context: *context }
+        let Self { body, scene, situation, loads, watched, fixed, context } = self;
+        TrialRuns { body, scene, situation, loads, watched, fixed: *fixed, context: *context }
     }
 }
 

@@ -2,6 +2,7 @@
 //! contain, and those that the selected modes represent (theory section 8).
 
 use super::cases::{Case, bounded, scenes};
+use super::shapes::FixedInterfaceModes;
 use super::situation::{PointRows, Situation};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -24,14 +25,17 @@ pub(super) struct FramedTests<'s> {
     pub scene: Cow<'s, Scene>,
     diagnostics: Vec<Diagnostic>,
     scenes: Vec<Scene>,
+    /// Fixed-interface modes of a Craig-Bampton body that may be left out.
+    pub fixed: Option<FixedInterfaceModes<'s>>,
 }
 
 impl<'s> FramedTests<'s> {
     pub(super) fn new(body: &'s FlexBody, scene: &'s Scene) -> Result<Self> {
+        let fixed = FixedInterfaceModes::new(body, scene);
         let FramedScene { body, scene, diagnostics } = FramedScene::new(body, scene)?;
         let (body, scene) = damped_once(body, scene)?;
         let scenes = scenes(&body, &scene)?;
-        Ok(Self { body, scene, diagnostics, scenes })
+        Ok(Self { body, scene, diagnostics, scenes, fixed })
     }
 }
 
@@ -70,8 +74,8 @@ impl<'c> Demand<'c> {
     ) -> Result<Self> {
         let (body, scene) = (&*framed.body, &*framed.scene);
         let (loads, _) = points_of(body, scene)?;
-        let cases =
-            framed.scenes.iter().map(|scene| Case::new(body, scene, context)).collect::<Result<Vec<_>>>()?;
+        let case = |scene| Ok(Case::new(body, scene, context)?.with_fixed(framed.fixed.as_ref()));
+        let cases = framed.scenes.iter().map(case).collect::<Result<Vec<_>>>()?;
         let bounds = bounded(&cases, tier_1)?;
         Ok(Self {
             name,

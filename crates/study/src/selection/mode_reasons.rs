@@ -3,6 +3,7 @@
 use super::bounds::Variation;
 use super::choice::Choice;
 use super::demand::Demand;
+use super::shapes::Pool;
 use super::situation::PointRows;
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -68,7 +69,7 @@ impl ModeReasons {
     /// Collects the reasons for `choice` after the `trials`; `None` unless the fewest modes were looked for.
     pub(super) fn of(demands: &[Demand<'_>], choice: &Choice, trials: &[Trial]) -> Option<Self> {
         let (count, ranked) = (choice.modes.len(), &choice.ranked);
-        if ranked.is_empty() {
+        if ranked.is_empty() || choice.pool != Pool::Modes {
             return None;
         }
         let worth = |mode: Option<&usize>, trial: Option<&Trial>| -> Option<ModeWorth> {

@@ -5,6 +5,7 @@ use super::cases::{Case, SLACK_OF_RANGE, sets_in, together, worst};
 use super::choice::Choice;
 use super::demand::{BEYOND_BAND, Demand};
 use super::ranking::{by_weight, fewest, first_of, weights};
+use super::shapes::Pool;
 use super::situation::PointRows;
 use super::trial::{Trial, TrialRuns, multiplications};
 use super::variations::{VariedRuns, VariedSelection};
@@ -51,14 +52,8 @@ impl<'s> SelectionState<'s> {
             let case = (demands.len() > 1).then_some(at);
             trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
         }
-        let choice = Choice {
-            groups: demands.iter().fold(TermGroups::NONE, |groups, demand| groups.or(demand.groups())),
-            modes: (0..demands[0].body.n_modes()).collect(),
-            shares: Vec::new(),
-            chosen: None,
-            ranked: Vec::new(),
-            next: None,
-        };
+        let groups = demands.iter().fold(TermGroups::NONE, |groups, demand| groups.or(demand.groups()));
+        let choice = Choice::of_modes(groups, demands[0].body.n_modes());
         let (short_of, stress_errors) = (vec![None; demands.len()], vec![None; demands.len()]);
         let (chosen_by_case, varied) = (Vec::new(), Vec::new());
         let groups_of_variations = TermGroups::NONE;
@@ -195,13 +190,18 @@ impl<'s> SelectionState<'s> {
             });
         }
         search.terms(choice, trials)?;
-        search.modes(choice, trials)?;
+        search.shapes(choice, trials)?;
         search.fewer_terms(choice, trials)?;
         let within = match self.demands.len() {
             1 => "the tolerances",
             _ => "the tolerances of every load case",
         };
-        Ok(format!("the fewest modes whose motion is within {within}"))
+        Ok(match choice.pool {
+            Pool::Modes => format!("the fewest modes whose motion is within {within}"),
+            Pool::FixedInterface => format!(
+                "all motions of the interfaces, and the fewest fixed-interface modes with which the motion is within {within}"
+            ),
+        })
     }
 
     /// Judges the choice on variations, and returns the reason for the modes. Terms and modes are added until it holds there if
@@ -233,11 +233,11 @@ impl<'s> SelectionState<'s> {
             let mut chosen = Vec::new();
             let mut growth = None;
             for TestScene { runs, measure } in &case.scenes {
-                let (modes, groups) = (&self.choice.modes, self.choice.groups);
-                let (trial, history) = runs.measured(measure, modes, groups, case.budget)?;
+                let Choice { pool, modes, groups, .. } = &self.choice;
+                let (trial, history) = runs.measured_of(*pool, measure, modes, *groups, case.budget)?;
                 let own = history.and_then(|history| history.growth(measure.trace(), demand.tolerance()));
                 growth = [growth, own].into_iter().flatten().reduce(f64::max);
-                let said = resonances(runs, measure, modes).into_iter();
+                let said = resonances(runs, measure, *pool, modes).into_iter();
                 self.diagnostics.extend(said.map(|said| demand.about(said)));
                 chosen.push(trial);
             }
@@ -248,7 +248,7 @@ impl<'s> SelectionState<'s> {
         let count = self.choice.modes.len();
         if count < self.choice.ranked.len() {
             let more = first_of(&self.choice.ranked, count + 1);
-            self.choice.next = Some(search.measured(&more, self.choice.groups, 1.0)?);
+            self.choice.next = Some(search.measured(self.choice.pool, &more, self.choice.groups, 1.0)?);
         }
         Ok(())
     }
@@ -257,6 +257,10 @@ impl<'s> SelectionState<'s> {
 /// Part of the remaining tolerances that dropped terms may take before modes are dropped. In the last search, with the
 /// kept modes, they may take all of it.
 const PART_OF_TERMS: f64 = 0.5;
+
+/// Number of modes, relative to that of the body with some fixed-interface modes and all motions of its interfaces, below
+/// which modes are picked instead. A larger value takes fewer modes, which hold under fewer other loads.
+const PART_OF_MODES: f64 = 0.75;
 
 /// Returns the modes of a body by their contribution to its motion, largest first. [`select`](super::select) keeps
 /// modes in this order. `cases` holds, for each load case, the body in its frame, the scene and the motion; the largest
@@ -302,11 +306,11 @@ impl SelectionSearch<'_> {
         self.cases[0].scenes[0].runs.body
     }
 
-    /// Measures a model in all load cases. It may use `part` of the remaining tolerances of each.
-    fn measured(&self, modes: &[usize], groups: TermGroups, part: f64) -> Result<Trial> {
+    /// Measures a model with `shapes` of a pool in all load cases. It may use `part` of the remaining tolerances of each.
+    fn measured(&self, pool: Pool, shapes: &[usize], groups: TermGroups, part: f64) -> Result<Trial> {
         let in_case = |case: &TestedCase<'_>| -> Result<Trial> {
             let measured = |TestScene { runs, measure }: &TestScene<'_>| -> Result<Trial> {
-                Ok(runs.measured(measure, modes, groups, part * case.budget)?.0)
+                Ok(runs.measured_of(pool, measure, shapes, groups, part * case.budget)?.0)
             };
             Ok(worst(case.scenes.iter().map(measured).collect::<Result<Vec<_>>>()?.into_iter()))
         };
@@ -330,7 +334,7 @@ impl SelectionSearch<'_> {
             .filter(|set| *set != choice.groups && set.and(choice.groups) == *set)
             .filter(|set| set.and(self.fixed) == self.fixed);
         for groups in smaller.collect::<Vec<_>>() {
-            let trial = self.measured(&choice.modes, groups, part)?;
+            let trial = self.measured(choice.pool, &choice.modes, groups, part)?;
             let passed = trial.passed();
             trials.push(trial);
             if passed {
@@ -341,13 +345,24 @@ impl SelectionSearch<'_> {
         Ok(())
     }
 
-    /// Returns the modes by descending contribution, and records their shares.
+    /// Returns the number of shapes of a pool.
+    fn number_of(&self, pool: Pool) -> usize {
+        self.cases[0].scenes[0].runs.number_of(pool)
+    }
+
+    /// Returns true if fixed-interface modes may be left out in every scene.
+    fn has_fixed_interface_modes(&self) -> bool {
+        let scenes = self.cases.iter().flat_map(|case| &case.scenes);
+        scenes.into_iter().all(|scene| scene.runs.fixed.is_some())
+    }
+
+    /// Returns the shapes of the pool by descending contribution, and records their shares.
     pub(super) fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
-        let mut weight = vec![0.0f64; self.body().n_modes()];
+        let mut weight = vec![0.0f64; self.number_of(choice.pool)];
         choice.shares.clear();
         for case in self.cases {
             for TestScene { runs, measure } in &case.scenes {
-                let shares = runs.shares(measure.trace());
+                let shares = runs.shares_of(choice.pool, measure.trace());
                 let own = weights(&shares, &runs.scene.requirements.tolerance);
                 weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
                 if choice.shares.is_empty() {
@@ -365,15 +380,44 @@ impl SelectionSearch<'_> {
         by_weight(&weight)
     }
 
-    /// Chooses the fewest modes, in the order of their contribution, whose motion is within the tolerances.
-    pub(super) fn modes(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+    /// Chooses the pool from which the fewest shapes make a body of the fewest modes within the tolerances: fixed-interface
+    /// modes, where the body has them, or modes.
+    fn shapes(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+        let nf = self.body().n_modes();
+        if !self.has_fixed_interface_modes() {
+            return self.fewest_modes(nf, choice, trials);
+        }
+        // None may be enough beside motions of the interfaces that deform the body: counted from 1.
+        choice.pool = Pool::FixedInterface;
         let ranked = self.ranked(choice);
-        let passes = |count: usize| {
-            let trial = self.measured(&first_of(&ranked, count), choice.groups, 1.0)?;
-            trials.push(trial);
+        let passes = |above: usize| {
+            let kept = first_of(&ranked, above - 1);
+            trials.push(self.measured(Pool::FixedInterface, &kept, choice.groups, 1.0)?);
             Ok(trials[trials.len() - 1].passed())
         };
-        let enough = fewest(0, ranked.len(), passes)?;
+        let enough = fewest(usize::from(nf == ranked.len()), ranked.len() + 1, passes)? - 1;
+        // Without motions of the interfaces other loads there hardly deform the body: modes must be clearly fewer.
+        let mut of_modes = Choice::of_modes(choice.groups, nf);
+        let most = ((nf - ranked.len() + enough) as f64 * PART_OF_MODES).ceil() as usize;
+        self.fewest_modes(most, &mut of_modes, trials)?;
+        if of_modes.modes.len() < most {
+            *choice = of_modes;
+        } else {
+            choice.keep_most(&ranked, enough);
+            choice.ranked = ranked;
+        }
+        Ok(())
+    }
+
+    /// Chooses the fewest modes, in the order of their contribution, whose motion is within the tolerances, or the first
+    /// `most`, which are not tried.
+    fn fewest_modes(&self, most: usize, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+        let ranked = self.ranked(choice);
+        let passes = |count: usize| {
+            trials.push(self.measured(Pool::Modes, &first_of(&ranked, count), choice.groups, 1.0)?);
+            Ok(trials[trials.len() - 1].passed())
+        };
+        let enough = fewest(0, most, passes)?;
         choice.keep_most(&ranked, enough);
         choice.ranked = ranked;
         Ok(())
@@ -404,7 +448,7 @@ impl SelectionSearch<'_> {
             }
             let modes = first_of(&ranked, fits);
             // Measure the set with these modes, and keep the most accurate.
-            let trial = self.measured(&modes, groups, 1.0)?;
+            let trial = self.measured(Pool::Modes, &modes, groups, 1.0)?;
             if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst * (1.0 - TIE_MARGIN)) {
                 best = Some((trial.worst, groups, modes));
             }
@@ -431,10 +475,15 @@ fn phase_drifts(growth: f64) -> Diagnostic {
     Diagnostic::new(Code::PhaseDrifts, message)
 }
 
-/// Returns warnings about dropped modes that a load excites near their frequency.
-fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
+/// Returns warnings about dropped shapes of a pool that a load excites near their frequency.
+fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, pool: Pool, kept: &[usize]) -> Vec<Diagnostic> {
     let (body, scene) = (runs.body, runs.scene);
-    let rows = PointRows::new(body);
+    let (rows, fixed) = (PointRows::new(body), runs.fixed.filter(|_| pool == Pool::FixedInterface));
+    let eigenvalues = fixed.map_or(&*body.modes().eigenvalue, |fixed| fixed.eigenvalues());
+    let (noun, damping) = match pool {
+        Pool::Modes => ("mode", body.modes().damping_ratio.clone()),
+        Pool::FixedInterface => ("fixed-interface mode", vec![0.0; eigenvalues.len()]),
+    };
     let spin = measure.trace().extremes.spin;
     let mut diagnostics = Vec::new();
     for (load, point) in scene.loads.iter().zip(runs.loads) {
@@ -446,20 +495,23 @@ fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[usize]) -> V
             }
             _ => vec![turning],
         };
-        let modal = rows.of(point);
-        for (j, lambda) in body.modes().eigenvalue.iter().enumerate() {
+        let modal = match fixed {
+            Some(fixed) => PointRows::combined(&rows.of(point), fixed.shapes()),
+            None => rows.of(point),
+        };
+        for (j, lambda) in eigenvalues.iter().enumerate() {
             let moved =
                 modal.column(j).norm() * load.force.main_direction().map_or(0.0, |along| along.norm());
             let near = |rate: &&f64| {
-                let width = RESONANCE_DISTANCE.max(3.0 * body.modes().damping_ratio[j]);
+                let width = RESONANCE_DISTANCE.max(3.0 * damping[j]);
                 (*rate / lambda.sqrt() - 1.0).abs() < width
             };
-            if moved == 0.0 || modes.binary_search(&j).is_ok() {
+            if moved == 0.0 || kept.binary_search(&j).is_ok() {
                 continue;
             }
             if let Some(rate) = rates.iter().find(near) {
                 let message = format!(
-                    "mode {} of frequency {:.4e} is dropped, but the load at {} excites it at {:.4e} (oscillations per unit of time)",
+                    "{noun} {} of frequency {:.4e} is dropped, but the load at {} excites it at {:.4e} (oscillations per unit of time)",
                     j + 1,
                     lambda.sqrt() / TAU,
                     load.at,

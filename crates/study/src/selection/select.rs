@@ -5,6 +5,7 @@ use super::decisions::{DecisionInput, DecisiveError, decision};
 use super::demand::{Demand, FramedTests, Participation, participations};
 use super::mode_reasons::ModeReasons;
 use super::search::SelectionState;
+use super::shapes::{FixedInterfaceChoice, Pool};
 use super::significance::{Significance, largest_significances, significances};
 use super::situation::Input;
 use super::trial::{ModeShare, Trial, multiplications};
@@ -12,7 +13,7 @@ use super::variations::{VariedRuns, VariedSelection, framed_variations};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
+use flexbody_body::flex_body::{FlexBody, Subset, TermDecision, TermGroup, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::ties::first_largest;
 use flexbody_motion::scene::{LoadCases, PerQuantity, StressError, Tolerance};
@@ -38,13 +39,17 @@ pub struct Selection {
     pub decisive_errors: Vec<Option<DecisiveError>>,
     /// Groups that are kept.
     pub groups: TermGroups,
-    /// Number of modes of the body.
+    /// Fixed-interface modes that a Craig-Bampton body keeps beside all motions of its interfaces; `None` if the selection picks
+    /// modes.
+    pub fixed_interface: Option<FixedInterfaceChoice>,
+    /// Number of modes of the body or, with `fixed_interface`, of the body with these fixed-interface modes.
     pub n_modes: usize,
-    /// Frequency of each mode of the body, in hertz.
+    /// Frequency of each of these modes, in hertz.
     pub frequencies_hz: Vec<f64>,
     /// Indices of the kept modes (from 0).
     pub modes: Vec<usize>,
-    /// Contribution of every mode of the body; empty if no motion was integrated.
+    /// Contribution of every mode of the body or, with `fixed_interface`, of every fixed-interface mode; empty if no motion was
+    /// integrated.
     pub shares: Vec<ModeShare>,
     /// Parts of the static responses to the loads that the selected modes miss.
     pub participations: Vec<Participation>,
@@ -76,6 +81,26 @@ pub struct Selection {
 }
 
 impl Selection {
+    /// Returns the modes and groups that are selected of the body.
+    pub fn subset(&self) -> Subset {
+        Subset {
+            fixed_interface_modes: self.fixed_interface.as_ref().map(|choice| choice.kept.clone()),
+            modes: Some(self.modes.clone()),
+            groups: self.groups,
+        }
+    }
+
+    /// Returns the selected body of `whole`, with the reasons for its groups.
+    ///
+    /// # Errors
+    /// The errors of [`FlexBody::with_fixed_interface_modes`] and [`FlexBody::reduced`].
+    pub fn body(&self, whole: &FlexBody) -> Result<FlexBody> {
+        let fewer =
+            self.fixed_interface.as_ref().map(|choice| whole.with_fixed_interface_modes(&choice.kept));
+        let fewer = fewer.transpose()?;
+        fewer.as_ref().unwrap_or(whole).reduced(&self.modes, self.groups, self.terms.clone())
+    }
+
     /// Returns true if the requirement holds: the cost, or else the measured errors, relative to a body whose truncation error
     /// and missing stress stiffness take at most half of the tolerances each, also in every stated variation. True if nothing
     /// was measured.
@@ -201,6 +226,7 @@ pub fn select_judged(
     let decided = with_variations(decided, groups_of_variations, &varied, cases);
     let (terms, decisive_errors): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
     let first = &demands[0];
+    let parts = SelectedModes::new(&choice, body, first)?;
     Ok(Selection {
         mode_reasons: ModeReasons::of(&demands, &choice, &trials),
         scene: cases.name().to_owned(),
@@ -213,14 +239,19 @@ pub fn select_judged(
         multiplications: multiplications(first.body, first.body.invariants().groups()),
         guideline: guideline(choice.groups),
         groups: choice.groups,
-        n_modes: first.body.n_modes(),
-        frequencies_hz: first.body.frequencies_hz(),
-        participations: static_responses(&demands, &choice.modes),
+        n_modes: parts.frequencies_hz.len(),
+        frequencies_hz: parts.frequencies_hz,
+        participations: if parts.fixed_interface.is_none() {
+            static_responses(&demands, &choice.modes)
+        } else {
+            Vec::new()
+        },
         cases: by_case(&demands, &choice, &trials, &decisive_errors, chosen_by_case),
         varied,
         terms,
         decisive_errors,
-        modes: choice.modes,
+        fixed_interface: parts.fixed_interface,
+        modes: parts.modes,
         shares: choice.shares,
         mode_reason,
         chosen: choice.chosen,
@@ -230,6 +261,32 @@ pub fn select_judged(
         stress_error: worst_stress_error(&demands),
         diagnostics: once(diagnostics),
     })
+}
+
+/// Modes of a selection, by the pool that they were picked from.
+struct SelectedModes {
+    fixed_interface: Option<FixedInterfaceChoice>,
+    modes: Vec<usize>,
+    frequencies_hz: Vec<f64>,
+}
+
+impl SelectedModes {
+    /// Returns the modes of `choice` of `body`, of which `demand` has the one in the frame of its scene.
+    fn new(choice: &Choice, body: &FlexBody, demand: &Demand<'_>) -> Result<Self> {
+        if choice.pool == Pool::Modes {
+            let (modes, frequencies_hz) = (choice.modes.clone(), demand.body.frequencies_hz());
+            return Ok(Self { fixed_interface: None, modes, frequencies_hz });
+        }
+        let fewer = body.with_fixed_interface_modes(&choice.modes)?;
+        Ok(Self {
+            fixed_interface: Some(FixedInterfaceChoice {
+                kept: choice.modes.clone(),
+                of: choice.ranked.len(),
+            }),
+            modes: (0..fewer.n_modes()).collect(),
+            frequencies_hz: fewer.frequencies_hz(),
+        })
+    }
 }
 
 /// Chooses terms and modes by integrated motion, beside the variations of the load cases. Returns the reason for the modes.
@@ -277,10 +334,11 @@ pub(super) fn by_case(
     if demands.len() == 1 {
         return Vec::new();
     }
+    let number = choice.chosen.as_ref().map(|chosen| chosen.modes);
     // Failed trial with one mode fewer than the choice: its worst load case binds the number of modes.
     let one_fewer = trials
         .iter()
-        .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && trial.modes + 1 == choice.modes.len());
+        .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && Some(trial.modes + 1) == number);
     let of_case = |(at, demand): (usize, &Demand<'_>)| {
         let is_bound_here = |group: &TermGroup, decisive_error: &Option<DecisiveError>| {
             choice.groups.has(*group)

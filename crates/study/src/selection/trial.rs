@@ -3,7 +3,9 @@
 use super::bounds::{Driven, ErrorBound, Variation};
 use super::dropped_terms::{DroppedTerms, torques_of_w3};
 use super::norms::Norms;
+use super::shapes::{FixedInterfaceModes, Pool};
 use super::situation::{PointRows, Situation};
+use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Subset, TermGroups};
@@ -11,10 +13,11 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::largest;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
-    ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, RecoveryMeasure, Resolution, Scene,
-    Spin, StressError, Trace, ends_a_run, reaction_errors, simulate, trace, trace_at,
+    ErrorHistory, LEAST_REACTION, Load, Measure, OtherModes, OutputErrors, Recording, RecoveryMeasure,
+    Resolution, Scene, Spin, StressError, Trace, ends_a_run, reaction_errors, simulate, trace, trace_at,
 };
 use nalgebra::{DMatrix, Vector3};
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 /// Number of instants per shortest period at which bounds evaluate a motion.
@@ -83,6 +86,8 @@ pub struct TrialRuns<'a> {
     pub loads: &'a [BodyPoint],
     /// Watched points.
     pub watched: &'a [BodyPoint],
+    /// Fixed-interface modes of a Craig-Bampton body that may be left out; `None` for another body.
+    pub fixed: Option<&'a FixedInterfaceModes<'a>>,
     /// Limits of time and memory for recordings.
     pub context: Context<'a>,
 }
@@ -180,24 +185,39 @@ impl TrialRuns<'_> {
         kept: TermGroups,
         budget: f64,
     ) -> Result<(Trial, Option<ErrorHistory>)> {
-        let whole = measure.body();
+        self.measured_of(Pool::Modes, measure, modes, kept, budget)
+    }
+
+    /// Does the work of [`TrialRuns::measured`] for the `shapes` of a pool.
+    ///
+    /// # Errors
+    /// The errors of [`TrialRuns::measured`].
+    pub(super) fn measured_of(
+        &self,
+        pool: Pool,
+        measure: &Measure<'_>,
+        shapes: &[usize],
+        kept: TermGroups,
+        budget: f64,
+    ) -> Result<(Trial, Option<ErrorHistory>)> {
         // The static columns of recoveries hold what dropped groups leave out, so that they belong to the groups too.
-        let held = whole.invariants().groups();
+        let held = measure.body().invariants().groups();
         let groups = if measure.recoveries().is_some() { held.and(kept) } else { held };
-        let own;
-        let body = if modes.len() == whole.n_modes() && groups == held {
-            whole
-        } else {
-            own = whole.clone().subset(&Subset { modes: Some(modes.to_vec()), groups })?;
-            &own
-        };
-        let mut scene =
-            if modes.len() == whole.n_modes() { self.scene.clone() } else { self.scene.of_modes(modes) };
+        let (body, shared) = self.body_of(pool, measure.body(), shapes, groups)?;
+        let is_some_of_modes = shared.is_none() && shapes.len() < self.number_of(pool);
+        let mut scene = if is_some_of_modes { self.scene.of_modes(shapes) } else { self.scene.clone() };
         scene.run.terms = self.terms(kept);
         // Use the steps of the reference, so that the errors come from the model alone.
         scene.run.scheme = measure.trace().scheme;
-        let history = match trace_at(body, &scene, &measure.trace().time, &self.context) {
-            Ok(trace) => Ok(measure.of_subset(&trace, modes)),
+        let history = match trace_at(&body, &scene, &measure.trace().time, &self.context) {
+            Ok(trace) => match &shared {
+                None if is_some_of_modes => Ok(measure.of_subset(&trace, shapes)),
+                None => Ok(measure.of_subset(&trace, &(0..body.n_modes()).collect::<Vec<_>>())),
+                Some(shared) => match OtherModes::new(&body, measure.body(), shared.as_ref()) {
+                    Some(others) => Ok(measure.of_other(&trace, &others)),
+                    None => Err("the modes cannot be compared with those of the whole body".to_owned()),
+                },
+            },
             Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
                 Err(error.first_error().message().to_owned())
             }
@@ -206,8 +226,8 @@ impl TrialRuns<'_> {
         let errors = history.as_ref().ok().map(ErrorHistory::largest);
         let trial = Trial {
             kept,
-            modes: modes.len(),
-            multiplications: multiplications(body, kept),
+            modes: body.n_modes(),
+            multiplications: multiplications(&body, kept),
             tier: 2,
             errors,
             budget,
@@ -217,6 +237,49 @@ impl TrialRuns<'_> {
             by_case: Vec::new(),
         };
         Ok((trial, history.ok()))
+    }
+
+    /// Returns the number of shapes of a pool.
+    pub(super) fn number_of(&self, pool: Pool) -> usize {
+        match pool {
+            Pool::Modes => self.body.n_modes(),
+            Pool::FixedInterface => self.fixed.map_or(0, FixedInterfaceModes::len),
+        }
+    }
+
+    /// Returns the body with `shapes` of a pool and the `groups`, of the `whole` body in the frame of the scene, and the stiffness
+    /// that couples its modes to those of the whole body; `None` for some of its modes.
+    fn body_of<'w>(
+        &self,
+        pool: Pool,
+        whole: &'w FlexBody,
+        shapes: &[usize],
+        groups: TermGroups,
+    ) -> Result<(Cow<'w, FlexBody>, Option<Mat<f64>>)> {
+        let is_all = shapes.len() == self.number_of(pool);
+        if is_all && groups == whole.invariants().groups() {
+            return Ok((Cow::Borrowed(whole), None));
+        }
+        let all_modes = Subset { groups, ..Subset::default() };
+        match (pool, self.fixed) {
+            (Pool::FixedInterface, Some(fixed)) if !is_all => {
+                let (body, shared) = fixed.body(shapes)?;
+                Ok((Cow::Owned(body.subset(&all_modes)?), Some(shared)))
+            }
+            (Pool::Modes, _) if !is_all => {
+                let subset = Subset { modes: Some(shapes.to_vec()), ..all_modes };
+                Ok((Cow::Owned(whole.clone().subset(&subset)?), None))
+            }
+            _ => Ok((Cow::Owned(whole.clone().subset(&all_modes)?), None)),
+        }
+    }
+
+    /// Returns the contribution of every shape of a pool to a motion of the body.
+    pub(super) fn shares_of(&self, pool: Pool, trace: &Trace) -> Vec<ModeShare> {
+        match (pool, self.fixed) {
+            (Pool::FixedInterface, Some(fixed)) => fixed.shares(self.body, self.watched, trace),
+            _ => self.shares(trace),
+        }
     }
 
     /// Returns the trial by bounds of a model with the groups `kept`. With its motion `run`, the dropped terms are

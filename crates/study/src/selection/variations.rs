@@ -103,7 +103,7 @@ impl<'v> VariedRuns<'v> {
             diagnostics: Vec::new(),
         };
         for (at, (tests, one)) in framed.iter().zip(all).enumerate() {
-            let case = Case::new(&tests.body, &tests.scene, context)?;
+            let case = Case::new(&tests.body, &tests.scene, context)?.with_fixed(tests.fixed.as_ref());
             let motion = case.runs().motion(tests.body.groups());
             match motion {
                 Ok((motion, _)) => runs.references.push(motion),
@@ -131,7 +131,7 @@ impl<'v> VariedRuns<'v> {
     fn measured(&self, measures: &[Measure<'_>], choice: &Choice) -> Result<Vec<Trial>> {
         let trial = |(at, (case, measure)): (usize, (&Case<'v>, &Measure<'_>))| {
             let budget = ReferenceError::left(self.reference_errors[at]);
-            Ok(case.runs().measured(measure, &choice.modes, choice.groups, budget)?.0)
+            Ok(case.runs().measured_of(choice.pool, measure, &choice.modes, choice.groups, budget)?.0)
         };
         self.cases.iter().zip(measures).enumerate().map(trial).collect()
     }
@@ -149,7 +149,8 @@ impl<'v> VariedRuns<'v> {
         let mut weight: Vec<f64> = Vec::new();
         for &at in of {
             let runs = self.cases[at].runs();
-            let own = weights(&runs.shares(measures[at].trace()), &runs.scene.requirements.tolerance);
+            let shares = runs.shares_of(choice.pool, measures[at].trace());
+            let own = weights(&shares, &runs.scene.requirements.tolerance);
             weight.resize(own.len(), 0.0);
             weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
         }
@@ -201,18 +202,20 @@ impl<'v> VariedRuns<'v> {
         let ranked = self.order(choice, &[at], measures);
         let budget = ReferenceError::left(self.reference_errors[at]);
         let passes = |count: usize, groups: TermGroups| -> Result<bool> {
-            let modes = first_of(&ranked, count);
-            Ok(self.cases[at].runs().measured(&measures[at], &modes, groups, budget)?.0.passed())
+            let (runs, modes) = (self.cases[at].runs(), first_of(&ranked, count));
+            Ok(runs.measured_of(choice.pool, &measures[at], &modes, groups, budget)?.0.passed())
         };
         let sets: &[TermGroups] = if choice.groups == held { &[held] } else { &[choice.groups, held] };
         for &groups in sets {
             if !passes(ranked.len(), groups)? {
                 continue;
             }
-            // The modes of the choice with its own groups have failed.
-            let too_few = choice.modes.len() - usize::from(groups != choice.groups);
-            let modes = fewest(too_few, ranked.len(), |count| passes(count, groups))?;
-            return Ok(Some(EnoughParts { modes, groups }));
+            // The shapes of the choice with its own groups have failed. Counted from 1, since none may be enough.
+            let too_few = choice.modes.len() + 1 - usize::from(groups != choice.groups);
+            let modes = fewest(too_few, ranked.len() + 1, |above| passes(above - 1, groups))? - 1;
+            let runs = self.cases[at].runs();
+            let others = runs.body.n_modes() - runs.number_of(choice.pool);
+            return Ok(Some(EnoughParts { modes: others + modes, groups }));
         }
         Ok(None)
     }

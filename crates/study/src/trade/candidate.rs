@@ -110,7 +110,7 @@ impl Candidate {
 
     /// Returns the modes and groups of the source that the candidate keeps.
     pub fn subset(&self) -> Subset {
-        Subset { modes: Some(self.modes.clone()), groups: self.groups }
+        Subset { modes: Some(self.modes.clone()), groups: self.groups, ..Subset::default() }
     }
 
     /// Returns the body of the candidate.

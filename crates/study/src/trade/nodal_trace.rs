@@ -32,6 +32,8 @@ pub(super) struct NodalTrace {
     pub trace: Trace,
     spin: Peak,
     internal: Peak,
+    /// Largest energy, with that of translation.
+    total: f64,
 }
 
 impl NodalTrace {
@@ -52,7 +54,7 @@ impl NodalTrace {
             size: motion.size,
             resolution: motion.resolution,
         };
-        Self { displacements: Vec::new(), rows, trace, spin: Peak::default(), internal: Peak::default() }
+        Self { displacements: Vec::new(), rows, trace, spin: Peak::default(), internal: Peak::default(), total: 0.0 }
     }
 
     /// Records the state at a time, and the displacements of the `watched` points. `workspace` is scratch space of N
@@ -87,7 +89,9 @@ impl NodalTrace {
         let flight = 0.5 * evaluation.momenta().0.norm_squared() / trace.size.0;
         let energy = evaluation.equations().elastic_energy(u);
         self.spin.see(time, now.omega.norm());
-        self.internal.see(time, (evaluation.kinetic_energy() - flight + energy).max(0.0).sqrt());
+        let total = evaluation.kinetic_energy() + energy;
+        self.internal.see(time, (total - flight).max(0.0).sqrt());
+        self.total = self.total.max(total);
         trace.time.push(time);
         trace.attitude.push(now.attitude);
         trace.elastic.push(energy);
@@ -96,8 +100,9 @@ impl NodalTrace {
 
     /// Completes the motion with its scheme, work and extremes.
     pub(super) fn finish(&mut self, scheme: Scheme, work: Work) {
-        let extremes =
-            Extremes { spin: self.spin.value, internal: self.internal.value.powi(2), ..Extremes::default() };
+        let internal = self.internal.value.powi(2);
+        let rounding = Extremes::rounding_of(internal, self.total);
+        let extremes = Extremes { spin: self.spin.value, internal, rounding, ..Extremes::default() };
         self.trace = Trace { scheme, work, extremes, ..self.trace.clone() };
     }
 

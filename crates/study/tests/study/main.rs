@@ -14,6 +14,7 @@ mod reference;
 mod scene_frames;
 mod selection_bounds;
 mod selection_carried;
+mod selection_craig_bampton;
 mod selection_reasons;
 mod selection_verdicts;
 mod skewed_beam;

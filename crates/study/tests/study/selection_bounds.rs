@@ -64,7 +64,7 @@ impl<'t> Tested<'t> {
 
     fn runs(&self) -> TrialRuns<'_> {
         let Self { body, scene, situation, loads, watched } = self;
-        TrialRuns { body, scene, situation, loads, watched, context: Context::QUIET }
+        TrialRuns { body, scene, situation, loads, watched, fixed: None, context: Context::QUIET }
     }
 
     /// Returns the motion at the output times of the scene.

@@ -51,7 +51,7 @@ fn selected(body: &FlexBody, cases: &LoadCases) -> Selection {
 }
 
 /// Returns the largest difference between two bodies of elastic energy and reaction over a run, relative to the largest.
-fn difference(whole: &FlexBody, own: &FlexBody, cases: &LoadCases) -> f64 {
+pub fn difference(whole: &FlexBody, own: &FlexBody, cases: &LoadCases) -> f64 {
     let [a, b] = [whole, own].map(|body| simulate(body, &cases[0], &Context::QUIET).expect("a motion").0);
     let energy = |at: usize, of: &flexbody_motion::scene::Recording| of.balances[at].elastic.sqrt();
     let reaction =
@@ -82,10 +82,11 @@ fn a_bar_shaken_along_its_axis_takes_a_few_modes_and_no_group() {
     assert!(selection.terms.iter().all(|term| !term.kept && term.tier == 0 && term.bound <= term.limit));
     assert!(selection.modes.len() <= 4, "{:?}", selection.modes);
     assert!(selection.holds());
-    let own = body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
+    let own = selection.body(&body).expect("a body");
     assert!(difference(&body, &own, &scene) < 0.01);
     // The same bound rules the groups out before they are computed.
-    let linear = body.clone().subset(&Subset { modes: None, groups: TermGroups::NONE }).expect("a body");
+    let linear =
+        body.clone().subset(&Subset { groups: TermGroups::NONE, ..Subset::default() }).expect("a body");
     let ruled_out = rule_out(&linear, &scene, &Context::QUIET);
     assert_eq!(ruled_out.expect("decisions").len(), 3);
 
@@ -115,6 +116,6 @@ fn a_turning_carrier_needs_w1() {
     assert!(selection.groups.w1, "{:?}", selection.terms);
     assert_eq!(selection.groups.in_carried_modes(), selection.groups);
     assert!(selection.groups != TermGroups::ALL, "{:?}", selection.groups);
-    let own = body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
+    let own = selection.body(&body).expect("a body");
     assert!(difference(&body, &own, &slow) < 0.011, "{}", difference(&body, &own, &slow));
 }

@@ -34,7 +34,7 @@ fn selected(body: &FlexBody, scene: &Scene) -> Selection {
 /// Measures a body of some modes beside the whole one.
 fn measured(body: &FlexBody, scene: &Scene, selection: &Selection, modes: &[usize]) -> OutputErrors {
     let (whole, _) = trace(body, scene, &Context::QUIET).expect("a motion");
-    let subset = Subset { modes: Some(modes.to_vec()), groups: body.groups() };
+    let subset = Subset { modes: Some(modes.to_vec()), groups: body.groups(), ..Subset::default() };
     let mut reduced = scene.of_modes(modes);
     reduced.run.terms = reduced.run.terms.held(selection.groups);
     let few = body.clone().subset(&subset).expect("fewer modes");
