@@ -182,7 +182,7 @@ pub fn reaction_errors(
     let of_part = |k: usize| {
         let (part, lever) = (parts[k], levers[k]);
         // Forces below rounding count as zero for any limit.
-        if largest[k] <= extremes.rounding / lever {
+        if largest[k] <= extremes.rounding() / lever {
             return None;
         }
         // Force and torque in units of torque: each is compared only above a part of the other.

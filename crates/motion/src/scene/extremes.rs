@@ -27,8 +27,8 @@ pub struct Extremes {
     pub elastic: f64,
     /// Largest internal energy: kinetic energy without that of translation, plus elastic energy.
     pub internal: f64,
-    /// Torque, or force times a length, that counts as rounding.
-    pub rounding: f64,
+    /// Largest energy with that of translation.
+    pub total: f64,
     /// Largest angular velocity |omega|.
     pub spin: f64,
     /// Largest components |omega_k| of the angular velocity along the body axes.
@@ -42,10 +42,9 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// Returns the torque, or force times a length, that counts as rounding beside the largest internal energy and the largest
-    /// energy with that of translation: a carrier in pure translation exerts nothing else.
-    pub fn rounding_of(internal: f64, total: f64) -> f64 {
-        NO_TORQUE * internal + ROUNDINGS * f64::EPSILON * total
+    /// Returns the torque, or force times a length, that counts as rounding: a carrier in pure translation exerts nothing else.
+    pub fn rounding(&self) -> f64 {
+        NO_TORQUE * self.internal + ROUNDINGS * f64::EPSILON * self.total
     }
 }
 
@@ -151,7 +150,7 @@ impl<'b> Survey<'b> {
             amplitudes: self.amplitudes.iter().map(|peak| peak.value).collect(),
             elastic: self.elastic.value.powi(2),
             internal,
-            rounding: Extremes::rounding_of(internal, self.differences.total),
+            total: self.differences.total,
             spin: self.spin.value,
             spin_body: Vector3::from(self.spin_body.map(|peak| peak.value)),
             spins: self.spins.0,

@@ -163,14 +163,14 @@ fn why(selection: &Selection) -> String {
 /// Returns the reasons for the modes in words: what excites them, what the modes at the edge of the selection are worth, and where
 /// most of the remaining error comes from.
 fn of_modes(reasons: &ModeReasons, selection: &Selection) -> String {
+    let noun = if selection.fixed_interface.is_some() { "fixed-interface mode" } else { "mode" };
     let excited = |own: &Excitation| {
         let numbers: Vec<usize> = own.modes.iter().map(|mode| mode + 1).collect();
-        let (noun, verb) = if numbers.len() == 1 { ("mode", "is") } else { ("modes", "are") };
-        format!("{noun} {} {verb} excited by {}", ranges(&numbers), own.by)
+        let (plural, verb) = if numbers.len() == 1 { ("", "is") } else { ("s", "are") };
+        format!("{noun}{plural} {} {verb} excited by {}", ranges(&numbers), own.by)
     };
-    let mode = |worth: &ModeWorth| {
-        format!("mode {} ({})", worth.mode + 1, frequency(selection.frequencies_hz[worth.mode], 3))
-    };
+    let mode =
+        |worth: &ModeWorth| format!("{noun} {} ({})", worth.mode + 1, frequency(worth.frequency_hz, 3));
     let error = |worth: &ModeWorth| {
         format!("the error in {} is {}", worth.output, error_in_words(worth.output, worth.error, 2))
     };

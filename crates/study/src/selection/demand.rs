@@ -2,7 +2,7 @@
 //! contain, and those that the selected modes represent (theory section 8).
 
 use super::cases::{Case, bounded, scenes};
-use super::shapes::FixedInterfaceModes;
+use super::shapes::{FixedInterfaceModes, Pool};
 use super::situation::{PointRows, Situation};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -91,6 +91,11 @@ impl<'c> Demand<'c> {
             stress_error: None,
             short_of: None,
         })
+    }
+
+    /// Returns the fixed-interface modes if the pool is theirs.
+    pub(super) fn fixed(&self, pool: Pool) -> Option<&'c FixedInterfaceModes<'c>> {
+        self.cases.first().and_then(Case::fixed).filter(|_| pool == Pool::FixedInterface)
     }
 
     /// Returns the groups that the body holds and that bounds do not rule out.

@@ -3,7 +3,7 @@
 use super::bounds::Variation;
 use super::choice::Choice;
 use super::demand::Demand;
-use super::shapes::Pool;
+use super::shapes::{FixedInterfaceModes, Pool};
 use super::situation::PointRows;
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -39,15 +39,17 @@ pub struct ModeReasons {
 pub struct Excitation {
     /// Load or motion with the largest force on these modes.
     pub by: String,
-    /// Indices of the modes (from 0), ascending.
+    /// Indices of the modes (from 0), ascending, or of fixed-interface modes if these are picked.
     pub modes: Vec<usize>,
 }
 
 /// Error of a model with one mode more or fewer than the selected one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModeWorth {
-    /// Index of the mode (from 0).
+    /// Index of the mode (from 0), or of the fixed-interface mode if these are picked.
     pub mode: usize,
+    /// Its frequency. Unit: Hz.
+    pub frequency_hz: f64,
     /// Quantity with the largest ratio of error to tolerance.
     pub output: &'static str,
     /// Its error.
@@ -69,20 +71,30 @@ impl ModeReasons {
     /// Collects the reasons for `choice` after the `trials`; `None` unless the fewest modes were looked for.
     pub(super) fn of(demands: &[Demand<'_>], choice: &Choice, trials: &[Trial]) -> Option<Self> {
         let (count, ranked) = (choice.modes.len(), &choice.ranked);
-        if ranked.is_empty() || choice.pool != Pool::Modes {
+        if ranked.is_empty() {
             return None;
         }
+        let body = demands[0].body;
+        let lambda = match demands[0].fixed(choice.pool) {
+            Some(fixed) => fixed.eigenvalues(),
+            None => &body.modes().eigenvalue,
+        };
+        let frequency_hz = |mode: usize| body.units().frequency_of(lambda[mode]);
         let worth = |mode: Option<&usize>, trial: Option<&Trial>| -> Option<ModeWorth> {
             let trial = trial?;
             let tolerance = demands[trial.case.unwrap_or(0)].tolerance();
             let (output, error, _) = trial.errors?.decisive(tolerance);
-            Some(ModeWorth { mode: *mode?, output, error })
+            let mode = *mode?;
+            Some(ModeWorth { mode, frequency_hz: frequency_hz(mode), output, error })
         };
         // The search ends between a number of modes that fails and one that passes.
-        let fewer =
-            trials.iter().rfind(|trial| trial.tier == 2 && trial.modes + 1 == count && !trial.passed());
+        let others = body.n_modes() - ranked.len();
+        let is_fewer = |trial: &&Trial| {
+            trial.pool == choice.pool && trial.modes + 1 == others + count && !trial.passed()
+        };
+        let fewer = trials.iter().rfind(|trial| trial.tier == 2 && is_fewer(trial));
         Some(Self {
-            excited: excited(demands, &ranked[..count.min(TOLD)]),
+            excited: excited(demands, choice.pool, &ranked[..count.min(TOLD)]),
             without_last: worth(count.checked_sub(1).and_then(|last| ranked.get(last)), fewer),
             with_next: worth(ranked.get(count), choice.next.as_ref()),
             rest: error_source(demands, choice, trials),
@@ -103,7 +115,7 @@ fn error_source(demands: &[Demand<'_>], choice: &Choice, trials: &[Trial]) -> Op
         return Some(ErrorSource::Body);
     }
     let whole = demands[0].body.n_modes();
-    if choice.modes.len() == whole {
+    if choice.modes.len() == choice.ranked.len() {
         return Some(ErrorSource::Groups);
     }
     // Error of the groups alone, with all modes: measured or a bound; none if no group was left out.
@@ -117,9 +129,10 @@ fn error_source(demands: &[Demand<'_>], choice: &Choice, trials: &[Trial]) -> Op
     Some(if of_groups < MOST * own { ErrorSource::Modes } else { ErrorSource::Groups })
 }
 
-/// Returns what excites `modes`, those with one excitation together.
-fn excited(demands: &[Demand<'_>], modes: &[usize]) -> Vec<Excitation> {
-    let forces: Vec<(String, Vec<f64>)> = demands.iter().flat_map(excitations).collect();
+/// Returns what excites `modes` of a pool, those with one excitation together.
+fn excited(demands: &[Demand<'_>], pool: Pool, modes: &[usize]) -> Vec<Excitation> {
+    let forces: Vec<(String, Vec<f64>)> =
+        demands.iter().flat_map(|demand| excitations(demand, pool)).collect();
     let mut excited: Vec<Excitation> = Vec::new();
     for &mode in modes {
         let largest = first_largest(&forces, |(_, forces)| forces[mode].abs());
@@ -133,11 +146,14 @@ fn excited(demands: &[Demand<'_>], modes: &[usize]) -> Vec<Excitation> {
     excited
 }
 
-/// Returns the largest force on every mode by each load and motion of a load case.
-fn excitations(demand: &Demand<'_>) -> Vec<(String, Vec<f64>)> {
-    let (body, scene) = (demand.body, demand.scene);
-    let (nf, duration) = (body.n_modes(), demand.situation.duration.value);
-    let rows = PointRows::new(body);
+/// Returns the largest force on every mode of a pool by each load and motion of a load case.
+fn excitations(demand: &Demand<'_>, pool: Pool) -> Vec<(String, Vec<f64>)> {
+    let (body, scene, duration) = (demand.body, demand.scene, demand.situation.duration.value);
+    let (rows, fixed) = (PointRows::new(body), demand.fixed(pool));
+    let in_pool = |psi: DMatrix<f64>| match fixed {
+        Some(fixed) => PointRows::combined(&psi, fixed.shapes()),
+        None => psi,
+    };
     let mut all = Vec::new();
     let along = |psi: &DMatrix<f64>, history: &VectorHistory| -> Vec<f64> {
         let largest = Variation::of_vector(history, duration).largest;
@@ -145,16 +161,16 @@ fn excitations(demand: &Demand<'_>) -> Vec<(String, Vec<f64>)> {
             Some(direction) => psi.column(j).dot(&direction) * largest,
             None => psi.column(j).norm() * largest,
         };
-        (0..nf).map(force).collect()
+        (0..psi.ncols()).map(force).collect()
     };
     for (load, point) in scene.loads.iter().zip(&demand.loads) {
         let Load { at, force, torque, .. } = load;
         if !force.is_nothing() {
             let name = if load.is_named() { at.to_string() } else { format!("the force at {at}") };
-            all.push((name, along(&rows.of(point), force)));
+            all.push((name, along(&in_pool(rows.of(point)), force)));
         }
         if !torque.is_nothing() {
-            all.push((format!("the torque at {at}"), along(&rows.of_rotation(point), torque)));
+            all.push((format!("the torque at {at}"), along(&in_pool(rows.of_rotation(point)), torque)));
         }
     }
     let frame = if scene.prescribes() || scene.carried.is_some() {
@@ -162,11 +178,15 @@ fn excitations(demand: &Demand<'_>) -> Vec<(String, Vec<f64>)> {
     } else {
         vec![RigidAccelerations::new(Vector3::zeros(), &scene.initial.angular_velocity, &Vector3::zeros())]
     };
-    let modal: Vec<Vec<f64>> = frame.iter().filter_map(|motion| motion.modal(body.invariants())).collect();
-    let largest = |j: usize| modal.iter().map(|forces| forces[j].abs()).fold(0.0, f64::max);
+    let modal = frame.iter().filter_map(|motion| motion.modal(body.invariants()));
+    let modal: Vec<DMatrix<f64>> =
+        modal.map(|forces| in_pool(DMatrix::from_row_slice(1, forces.len(), &forces))).collect();
+    let largest = |j: usize| modal.iter().map(|forces| forces[(0, j)].abs()).fold(0.0, f64::max);
+    let count = fixed.map_or(body.n_modes(), FixedInterfaceModes::len);
     let name = if scene.carried.is_some() { "the motion of the carrier" } else { "the rotation" };
-    all.push((name.to_owned(), (0..nf).map(largest).collect()));
-    let mut start = vec![0.0; nf];
+    all.push((name.to_owned(), (0..count).map(largest).collect()));
+    // A scene that starts modes by their numbers picks from modes.
+    let mut start = vec![0.0; count];
     for own in &scene.initial.modes {
         start[own.mode] = own.amplitude * body.modes().eigenvalue[own.mode];
     }

@@ -334,11 +334,11 @@ pub(super) fn by_case(
     if demands.len() == 1 {
         return Vec::new();
     }
-    let number = choice.chosen.as_ref().map(|chosen| chosen.modes);
     // Failed trial with one mode fewer than the choice: its worst load case binds the number of modes.
-    let one_fewer = trials
-        .iter()
-        .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && Some(trial.modes + 1) == number);
+    let number = choice.chosen.as_ref().map(|chosen| chosen.modes);
+    let is_one_fewer = |trial: &&Trial| trial.pool == choice.pool && Some(trial.modes + 1) == number;
+    let one_fewer =
+        trials.iter().rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && is_one_fewer(trial));
     let of_case = |(at, demand): (usize, &Demand<'_>)| {
         let is_bound_here = |group: &TermGroup, decisive_error: &Option<DecisiveError>| {
             choice.groups.has(*group)

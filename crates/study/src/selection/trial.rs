@@ -46,6 +46,8 @@ fn size_of(body: &FlexBody) -> (f64, f64) {
 pub struct Trial {
     /// Groups of the model.
     pub kept: TermGroups,
+    /// Pool from which its modes were picked.
+    pub pool: Pool,
     /// Number of modes of the model.
     pub modes: usize,
     /// Multiplications of an evaluation of its equations.
@@ -226,6 +228,7 @@ impl TrialRuns<'_> {
         let errors = history.as_ref().ok().map(ErrorHistory::largest);
         let trial = Trial {
             kept,
+            pool,
             modes: body.n_modes(),
             multiplications: multiplications(&body, kept),
             tier: 2,
@@ -332,6 +335,7 @@ impl TrialRuns<'_> {
     fn without_errors(&self, kept: TermGroups, tier: u8, budget: f64) -> Trial {
         Trial {
             kept,
+            pool: Pool::Modes,
             modes: self.body.n_modes(),
             multiplications: multiplications(self.body, kept),
             tier,

@@ -54,7 +54,14 @@ impl NodalTrace {
             size: motion.size,
             resolution: motion.resolution,
         };
-        Self { displacements: Vec::new(), rows, trace, spin: Peak::default(), internal: Peak::default(), total: 0.0 }
+        Self {
+            displacements: Vec::new(),
+            rows,
+            trace,
+            spin: Peak::default(),
+            internal: Peak::default(),
+            total: 0.0,
+        }
     }
 
     /// Records the state at a time, and the displacements of the `watched` points. `workspace` is scratch space of N
@@ -101,8 +108,7 @@ impl NodalTrace {
     /// Completes the motion with its scheme, work and extremes.
     pub(super) fn finish(&mut self, scheme: Scheme, work: Work) {
         let internal = self.internal.value.powi(2);
-        let rounding = Extremes::rounding_of(internal, self.total);
-        let extremes = Extremes { spin: self.spin.value, internal, rounding, ..Extremes::default() };
+        let extremes = Extremes { spin: self.spin.value, internal, total: self.total, ..Extremes::default() };
         self.trace = Trace { scheme, work, extremes, ..self.trace.clone() };
     }
 
