@@ -17,8 +17,8 @@ const MAX_ENERGY_DIFFERENCE: f64 = 1e-9;
 /// thousand times its width with 240 fixed-interface modes.
 const SUMMAND_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Allowed motion of the interface that carries the frame, relative to the largest displacement of the
-/// mode; rounding causes it.
+/// Allowed motion of the interface that carries the frame, relative to the largest motion of a node in the mode
+/// (its displacement, or its rotation times its distance from the reference point); rounding causes it.
 const MAX_MOTION_AT_REST: f64 = 1e-9;
 
 impl Parts {
@@ -36,9 +36,14 @@ impl Parts {
         let arm = if interface_extent > 0.0 { interface_extent } else { extent };
         // Rotations of a single node at rest are zeros, as for nodes without rotations.
         let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
+        // The reference point moves by the displacements of the nodes and their rotations times its distance from them,
+        // and both are rounded. A torsion of a straight beam displaces no node.
+        let distance = self.nodes.positions.iter().map(|x| Vector3::from(*x).norm()).fold(0.0, f64::max);
+        let turn = |j: usize| self.modes.rotation.as_ref().map_or(0.0, |all| all.col(j).norm_max());
+        let size = |j: usize| self.modes.shape.col(j).norm_max().max(distance * turn(j));
         let moved = |j: usize| {
             let turned = rows.rotation.as_ref().map_or(unknown, |rotation| arm * rotation.col(j).norm_max());
-            rows.translation.col(j).norm_max().max(turned) / self.modes.shape.col(j).norm_max()
+            rows.translation.col(j).norm_max().max(turned) / size(j)
         };
         let modes = (0..self.modes.shape.ncols()).map(moved);
         let displaced = reference.iter().map(|x| x.abs() / extent);
