@@ -14,6 +14,7 @@ use super::held_interfaces::{check_prescribable, hold, unit_motions};
 use super::interface_rows::{
     CoordinatesInModelAxes, CoupledInterface, InterfaceCoordinates, coupled_interfaces,
 };
+use super::massless::{ShapesWithMass, most_with_mass, with_mass};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span, rigid_modes};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::{BasisKind, FixedInterface, ModeSettings};
@@ -70,9 +71,13 @@ impl Basis for CraigBampton {
         }
         // Solve the small eigenproblem in the span.
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
-        let whole = parts.misses_only_rigid_motions(&found, rigid_count(model.dimension()));
-        let span = found.vectors;
-        let mut solution = modes_of_span(&problem, span.clone(), &all, context).map_err(failed)?;
+        let massive = with_mass(model, &found.vectors);
+        let whole =
+            massive.is_none() && parts.misses_only_rigid_motions(&found, rigid_count(model.dimension()));
+        notes.extend(massive.as_ref().map(|massive| parts.nearly_massless(model, massive)));
+        let (span, modes) = (found.vectors, massive.map(|massive| massive.vectors));
+        let modes = modes.unwrap_or_else(|| span.clone());
+        let mut solution = modes_of_span(&problem, modes, &all, context).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
         let provenance = parts.provenance(&found.retained, parted.as_ref());
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
@@ -257,6 +262,24 @@ impl<'a> Parts<'a> {
             Diagnostic::new(Code::ShapesDependent, message)
         };
         vec![note]
+    }
+
+    /// Returns the warning about combinations of shapes that carry nearly no mass.
+    fn nearly_massless(&self, model: &FeModel, massive: &ShapesWithMass) -> Diagnostic {
+        let hertz = significant(model.units().frequency_of(massive.from), 4);
+        let message = format!(
+            "{} combinations of shapes carry nearly no mass and are left out (modes from {hertz} Hz on): the {} fixed-interface modes describe the motion of the masses so well that hardly more than local motions without mass is left of the interface motions; the body lacks the local flexibility that loads on these have",
+            massive.removed,
+            self.fixed.eigenvalues.len(),
+        );
+        let most = most_with_mass(model, &self.fixed_shapes(), &self.constraint).filter(|most| *most > 0);
+        let help = match most {
+            Some(most) if most < self.fixed.eigenvalues.len() => {
+                format!("ask for at most {most} modes to keep that flexibility, or give the rotations of the nodes their mass")
+            }
+            _ => "give the rotations of the nodes their mass to keep that flexibility".to_owned(),
+        };
+        Diagnostic::new(Code::ShapesDependent, message).with_help(help)
     }
 
     /// Returns the composition of the basis. `whole`: the basis spans all motions of the interfaces, a
