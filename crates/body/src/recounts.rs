@@ -13,6 +13,8 @@ use std::collections::BTreeSet;
 
 /// Allowed rounding error of a rigid motion of the nodes of an interface, relative to its largest motion.
 const MAX_RIGID_ROUNDING: f64 = 1e-8;
+/// Rotation relative to the largest of the modes below which an interface counts as at rest.
+const MAX_MOTION_AT_REST: f64 = 1e-6;
 /// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
 const MAX_NORM_ROUNDING: f64 = 1e-9;
 /// Allowed rounding error between coordinates computed from the shapes in two ways.
@@ -95,7 +97,8 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     let Some(rows) = rows else { return f64::INFINITY };
     let displaced = rows.deformation().1;
     let (Some(rotation), Some(turns)) = (rotation, &rows.rotation) else { return displaced };
-    let (mut left, mut size) = (0.0, turns.norm_max());
+    // Rounding errors of an interface at rest, such as the one that carries the frame, are no deformation.
+    let (mut left, mut size) = (0.0, larger(turns.norm_max(), MAX_MOTION_AT_REST * rotation.norm_max()));
     for &node in &interface.nodes {
         for k in 0..3 {
             let row = rotation.as_ref().subrows(3 * node + k, 1);

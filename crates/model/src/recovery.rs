@@ -412,7 +412,8 @@ pub(crate) fn check_rigid_responses(all: &[ModelRecovery], rows: &Rows, nodes: &
 
 fn strained(recovery: &ModelRecovery, fields: &Mat<f64>, rows: &Rows) -> Option<Diagnostic> {
     let RecoveryOperator::Rows { transposed, labels, .. } = &recovery.operator else { return None };
-    let checked: Vec<usize> = (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion()).collect();
+    let checked: Vec<usize> =
+        (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion()).collect();
     let d = rows.dimension;
     let extent = (0..rows.nodes).map(|node| place(node, fields, d).norm()).fold(f64::MIN_POSITIVE, f64::max);
     let responses: Vec<RigidResponse> =
@@ -469,9 +470,7 @@ impl RigidResponse {
         for c in 0..rigid_count(d) {
             // A rotation about the middle is one about the centre less the translation of the middle.
             let (shift, unit) = match c.checked_sub(d) {
-                Some(turn) => {
-                    (Vector3::ith(if d == 2 { 2 } else { turn }, 1.0).cross(&middle), 1.0 / length)
-                }
+                Some(turn) => (Vector3::ith(if d == 2 { 2 } else { turn }, 1.0).cross(&middle), 1.0 / length),
                 None => (Vector3::zeros(), 1.0),
             };
             let term = |(&row, value): (&u32, &f64)| {
@@ -483,7 +482,8 @@ impl RigidResponse {
                 .zip(values)
                 .map(term)
                 .fold((0.0, 0.0), |(sum, size): (f64, f64), term| (sum + term, size + term.abs()));
-            (response.value, response.size) = (larger(response.value, sum.abs()), larger(response.size, size));
+            (response.value, response.size) =
+                (larger(response.value, sum.abs()), larger(response.size, size));
         }
         response
     }

@@ -4,7 +4,8 @@ use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::{
-    CscMatrix, SparseLdl, SymmetricMatrix, combine, contiguous_mut, gram, side_by_side, symmetric_eigen,
+    CscMatrix, SparseLdl, SymmetricMatrix, combine, contiguous_mut, gram, multiply, side_by_side,
+    symmetric_eigen,
 };
 use flexbody_model::FeModel;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -124,18 +125,102 @@ fn stiffness_of(stiffness: &SymmetricMatrix, motions: &[LocalMotion]) -> Symmetr
     SymmetricMatrix::symmetrised(CscMatrix::from_triplets(motions.len(), motions.len(), &entries))
 }
 
-// Combinations of shapes whose energy is that of motions without mass.
+// Shapes whose energy is that of motions without mass.
 
-/// Part of the elastic energy of a combination of shapes that is left when all massless motions follow elastic forces,
-/// its masses in place, below which the combination carries nearly no mass. The eigenvalue of a mode of such shapes is
-/// a hundred times what its masses make of it and more, and without bound: on a lumped frame of ten beams with the motions
-/// of two interfaces and 10, 14, 18 and 20 of 27 fixed-interface modes the highest modes were at 1.4, 34, 880 and 18,000
-/// times the highest frequency of the frame. A larger value leaves out local flexibility of interfaces that the modes
-/// resolve.
+/// Part of the elastic energy of a shape that is left when all massless motions follow elastic forces, its masses in place,
+/// below which the shape carries nearly no mass. The eigenvalue of a mode of such shapes is a hundred times what its
+/// masses make of it and more, and without bound: on a lumped frame of ten beams with the motions of two interfaces and
+/// 10, 14, 18 and 20 of 27 fixed-interface modes the highest modes were at 1.4, 34, 880 and 18,000 times the highest
+/// frequency of the frame. A larger value leaves out local flexibility of interfaces that the modes resolve.
 const MIN_ENERGY_OF_MASSES: f64 = 0.01;
 
-/// Eigenvalue of the energy of shapes of unit energy below which a combination of them is a rigid motion.
+/// Part of the energy of a shape that is left when massless motions follow, below which its masses move by rounding only.
+const ROUNDING_ENERGY: f64 = 1e-9;
+
+/// Energy of a shape, relative to the sum of those of its single rows, above which [`ROUNDING_ENERGY`] of it is more than the
+/// rounding of its sums. The energy of local motions is of the order of that of their rows.
+const MIN_LOCAL_ENERGY: f64 = 1e-6;
+
+/// Energy of a combination of shapes of unit energy below which the combination is a rigid motion.
 const RIGID_ENERGY: f64 = 1e-10;
+
+/// Massless motions Z of the nodes of a model, which follow elastic forces.
+pub(super) struct MasslessMotions<'m> {
+    stiffness: &'m SymmetricMatrix,
+    motions: Vec<LocalMotion>,
+    /// Factor of Z'K Z.
+    factor: SparseLdl,
+}
+
+impl<'m> MasslessMotions<'m> {
+    /// Returns the motions; `None` if there are none, or K does not resist them.
+    pub(super) fn new(model: &'m FeModel) -> Option<Self> {
+        let of_nodes = model.rows().displacements() + model.rows().rotations().len();
+        let moves_nodes = |motion: &LocalMotion| motion.iter().all(|(row, _)| *row < of_nodes);
+        let motions: Vec<LocalMotion> = massless_motions(model).into_iter().filter(moves_nodes).collect();
+        let (stiffness, is_some) = (model.stiffness(), !motions.is_empty());
+        let factor = is_some.then(|| factor_of(stiffness, &motions)).flatten()?;
+        Some(Self { stiffness, motions, factor })
+    }
+
+    /// Returns true if a shape (N x 1) moves no mass but by rounding. A rigid motion, whose energy is rounding, does.
+    pub(super) fn make_up(&self, shape: MatRef<'_, f64>) -> bool {
+        let [whole, of_masses] = self.energies(shape).map(|energy| energy[(0, 0)]);
+        let of_rows: f64 =
+            self.stiffness.diagonal().into_iter().zip(shape.col(0).iter()).map(|(k, s)| k * s * s).sum();
+        whole > MIN_LOCAL_ENERGY * of_rows && of_masses < ROUNDING_ENERGY * whole
+    }
+
+    /// Removes the combinations of the M-orthonormal `vectors` (N x k) that carry nearly no mass. Returns `None` if there are
+    /// none.
+    pub(super) fn removed_from(&self, vectors: &Mat<f64>) -> Option<ShapesWithMass> {
+        let (parts, combinations) = combinations(&self.energies(vectors.as_ref()), vectors.ncols())?;
+        let removed = parts.partition_point(|part| *part < MIN_ENERGY_OF_MASSES);
+        if removed == 0 {
+            return None;
+        }
+        // The combinations have unit energy: the largest square of the M-norm is one over the lowest eigenvalue.
+        let (left_out, retained) = combinations.as_ref().split_at_col(removed);
+        let masses = symmetric_eigen(gram(left_out, left_out).as_ref())?;
+        let from = masses.values.last().map_or(f64::INFINITY, |mass| 1.0 / mass);
+        let vectors = combine(vectors.as_ref(), orthonormal(retained)?.as_ref());
+        Some(ShapesWithMass { vectors, removed, from })
+    }
+
+    /// Returns the elastic energies of shapes (N x k): V'K V, and what is left of it when massless motions follow,
+    /// V'K V - V'K Z (Z'K Z)^-1 Z'K V.
+    fn energies(&self, shapes: MatRef<'_, f64>) -> [Mat<f64>; 2] {
+        let mut forces = Mat::zeros(shapes.nrows(), shapes.ncols());
+        multiply(self.stiffness, 1, shapes, forces.as_mut());
+        let whole = gram(shapes, forces.as_ref());
+        let works = Mat::from_fn(self.motions.len(), shapes.ncols(), |i, j| {
+            self.motions[i].iter().map(|&(row, part)| part * forces[(row, j)]).sum()
+        });
+        let (mut amplitudes, mut scratch) = (works.clone(), vec![0.0; self.motions.len()]);
+        for column in amplitudes.col_iter_mut() {
+            self.factor.solve_in_place(1, contiguous_mut(column), &mut scratch);
+        }
+        let of_masses = &whole - gram(works.as_ref(), amplitudes.as_ref());
+        [whole, of_masses]
+    }
+
+    /// Returns the largest number of leading columns of `fixed` (N x m) that, with all of `others`, have no more
+    /// combinations without mass than `others` alone. Returns `None` if an energy is not finite.
+    pub(super) fn most_beside(&self, fixed: &Mat<f64>, others: &Mat<f64>) -> Option<usize> {
+        let energies = self.energies(side_by_side(&[others.as_ref(), fixed.as_ref()]).as_ref());
+        let massless = |count: usize| {
+            let (parts, _) = combinations(&energies, others.ncols() + count)?;
+            Some(parts.partition_point(|part| *part < MIN_ENERGY_OF_MASSES))
+        };
+        // More shapes have no fewer such combinations.
+        let (least, mut from, mut to) = (massless(0)?, 0, fixed.ncols());
+        while from < to {
+            let middle = (from + to).div_ceil(2);
+            if massless(middle)? <= least { from = middle } else { to = middle - 1 }
+        }
+        Some(from)
+    }
+}
 
 /// Shapes without the combinations that carry nearly no mass.
 pub(super) struct ShapesWithMass {
@@ -147,89 +232,29 @@ pub(super) struct ShapesWithMass {
     pub from: f64,
 }
 
-/// Removes the combinations of the M-orthonormal `vectors` (N x k) that carry nearly no mass. Returns `None` if there are
-/// none.
-pub(super) fn with_mass(model: &FeModel, vectors: &Mat<f64>) -> Option<ShapesWithMass> {
-    let (parts, combinations) = Energies::new(model, vectors)?.of_masses(vectors.ncols())?;
-    let removed = parts.partition_point(|part| *part < MIN_ENERGY_OF_MASSES);
-    if removed == 0 {
-        return None;
-    }
-    let orthonormal = |of: MatRef<'_, f64>| {
-        let sizes: Vec<f64> = of.col_iter().map(|column| column.norm_l2()).collect();
-        let unit = Mat::from_fn(of.nrows(), of.ncols(), |i, j| of[(i, j)] / sizes[j]);
-        let eigen = symmetric_eigen(gram(unit.as_ref(), unit.as_ref()).as_ref())?;
-        let root = |i: usize, j: usize| eigen.vectors[(i, j)] / eigen.values[j].sqrt();
-        Some(combine(unit.as_ref(), Mat::from_fn(sizes.len(), sizes.len(), root).as_ref()))
+/// Returns the combinations of the first `count` shapes that deform the body, K-orthogonal and of unit energy, with the
+/// part of their energy that is left when massless motions follow, ascending. Returns `None` if an energy is not finite.
+fn combinations([whole, of_masses]: &[Mat<f64>; 2], count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
+    let sizes: Vec<f64> = (0..count).map(|i| whole[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = |a: &Mat<f64>| {
+        Mat::from_fn(count, count, |i, j| 0.5 * (a[(i, j)] + a[(j, i)]) / (sizes[i] * sizes[j]))
     };
-    // The combinations have unit energy: the largest square of the M-norm is one over the lowest eigenvalue.
-    let (left_out, retained) = combinations.as_ref().split_at_col(removed);
-    let masses = symmetric_eigen(gram(left_out, left_out).as_ref())?;
-    let from = masses.values.last().map_or(f64::INFINITY, |mass| 1.0 / mass);
-    let vectors = combine(vectors.as_ref(), orthonormal(retained)?.as_ref());
-    Some(ShapesWithMass { vectors, removed, from })
+    let whole = symmetric_eigen(scaled(whole).as_ref())?;
+    let rigid = whole.values.partition_point(|energy| *energy <= RIGID_ENERGY);
+    let unit = Mat::from_fn(count, count - rigid, |i, j| {
+        whole.vectors[(i, rigid + j)] / whole.values[rigid + j].sqrt()
+    });
+    let part = gram(unit.as_ref(), combine(scaled(of_masses).as_ref(), unit.as_ref()).as_ref());
+    let part = symmetric_eigen(part.as_ref())?;
+    let unit = combine(unit.as_ref(), part.vectors.as_ref());
+    Some((part.values, Mat::from_fn(count, unit.ncols(), |i, j| unit[(i, j)] / sizes[i])))
 }
 
-/// Returns the largest number of leading columns of `fixed` (N x m) that, with all of `others`, have no more combinations
-/// without mass than `others` alone. Returns `None` if the model has no motions without mass.
-pub(super) fn most_with_mass(model: &FeModel, fixed: &Mat<f64>, others: &Mat<f64>) -> Option<usize> {
-    let energies = Energies::new(model, &side_by_side(&[others.as_ref(), fixed.as_ref()]))?;
-    let massless = |count: usize| {
-        let (parts, _) = energies.of_masses(others.ncols() + count)?;
-        Some(parts.partition_point(|part| *part < MIN_ENERGY_OF_MASSES))
-    };
-    // More shapes have no fewer such combinations.
-    let (least, mut from, mut to) = (massless(0)?, 0, fixed.ncols());
-    while from < to {
-        let middle = (from + to).div_ceil(2);
-        if massless(middle)? <= least { from = middle } else { to = middle - 1 }
-    }
-    Some(from)
-}
-
-/// Elastic energies of shapes: V'K V, and what is left of it when massless motions follow, V'K V - V'K Z (Z'K Z)^-1 Z'K V.
-struct Energies {
-    whole: Mat<f64>,
-    of_masses: Mat<f64>,
-}
-
-impl Energies {
-    /// Returns the energies; `None` if the model has no motions without mass, or K does not resist them.
-    fn new(model: &FeModel, shapes: &Mat<f64>) -> Option<Self> {
-        let of_nodes = model.rows().displacements() + model.rows().rotations().len();
-        let moves_nodes = |motion: &LocalMotion| motion.iter().all(|(row, _)| *row < of_nodes);
-        let motions: Vec<LocalMotion> = massless_motions(model).into_iter().filter(moves_nodes).collect();
-        if motions.is_empty() {
-            return None;
-        }
-        let factor = factor_of(model.stiffness(), &motions)?;
-        let forces = model.pencil().apply_stiffness(shapes.as_ref());
-        let whole = gram(shapes.as_ref(), forces.as_ref());
-        let work = |j: usize, motion: &LocalMotion| motion.iter().map(|&(row, part)| part * forces[(row, j)]).sum();
-        let works = Mat::from_fn(motions.len(), shapes.ncols(), |i, j| work(j, &motions[i]));
-        let (mut amplitudes, mut scratch) = (works.clone(), vec![0.0; motions.len()]);
-        for column in amplitudes.col_iter_mut() {
-            factor.solve_in_place(1, contiguous_mut(column), &mut scratch);
-        }
-        let relaxed = gram(works.as_ref(), amplitudes.as_ref());
-        Some(Self { of_masses: &whole - relaxed, whole })
-    }
-
-    /// Returns the parts of the energy of masses in the combinations of the first `count` shapes, ascending, and these
-    /// combinations, of unit energy and K-orthogonal. Returns `None` if an energy is not finite.
-    fn of_masses(&self, count: usize) -> Option<(Vec<f64>, Mat<f64>)> {
-        let sizes: Vec<f64> = (0..count).map(|i| self.whole[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
-        let scaled = |a: &Mat<f64>| {
-            Mat::from_fn(count, count, |i, j| 0.5 * (a[(i, j)] + a[(j, i)]) / (sizes[i] * sizes[j]))
-        };
-        let whole = symmetric_eigen(scaled(&self.whole).as_ref())?;
-        let rigid = whole.values.partition_point(|energy| *energy <= RIGID_ENERGY);
-        let unit = Mat::from_fn(count, count - rigid, |i, j| {
-            whole.vectors[(i, rigid + j)] / whole.values[rigid + j].sqrt()
-        });
-        let part = gram(unit.as_ref(), combine(scaled(&self.of_masses).as_ref(), unit.as_ref()).as_ref());
-        let part = symmetric_eigen(part.as_ref())?;
-        let unit = combine(unit.as_ref(), part.vectors.as_ref());
-        Some((part.values, Mat::from_fn(count, unit.ncols(), |i, j| unit[(i, j)] / sizes[i])))
-    }
+/// Returns orthonormal columns of the same span. Returns `None` if an entry is not finite.
+fn orthonormal(of: MatRef<'_, f64>) -> Option<Mat<f64>> {
+    let sizes: Vec<f64> = of.col_iter().map(|column| column.norm_l2()).collect();
+    let unit = Mat::from_fn(of.nrows(), of.ncols(), |i, j| of[(i, j)] / sizes[j]);
+    let eigen = symmetric_eigen(gram(unit.as_ref(), unit.as_ref()).as_ref())?;
+    let root = |i: usize, j: usize| eigen.vectors[(i, j)] / eigen.values[j].sqrt();
+    Some(combine(unit.as_ref(), Mat::from_fn(sizes.len(), sizes.len(), root).as_ref()))
 }

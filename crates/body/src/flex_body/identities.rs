@@ -68,8 +68,9 @@ impl Parts {
         let nf = root.len();
         let identity = |i: usize, j: usize| f64::from(i == j);
         // The shapes contain the strain energy of rigid motion due to rounding of K, the modes do not.
-        let of_stiffness =
-            MAX_ENERGY_DIFFERENCE + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding;
+        let of_stiffness = MAX_ENERGY_DIFFERENCE
+            + 10.0 * self.certificate.rigid_noise
+            + self.certificate.eigenvalue_rounding;
         let (of_energy, of_inertia) = (sums(stiffness, of_modes), sums(mass, of_modes));
         let mut checks = vec![
             worst_entry(("interface_stiffness", "B' K B = diag(lambda)"), nf, of_stiffness, |i, j| {
