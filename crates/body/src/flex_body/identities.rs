@@ -73,11 +73,11 @@ impl Parts {
             + self.certificate.eigenvalue_rounding;
         let (of_energy, of_inertia) = (sums(stiffness, of_modes), sums(mass, of_modes));
         let mut checks = vec![
-            worst_entry(("interface_stiffness", "B' K B = diag(lambda)"), nf, of_stiffness, |i, j| {
+            worst_entry("interface_stiffness", "B' K B = diag(lambda)", (nf, nf), of_stiffness, |i, j| {
                 let size = root[i] * root[j];
                 (energy[(i, j)] / size - identity(i, j), of_energy[(i, j)] / size)
             }),
-            worst_entry(("interface_mass", "B' M B = I"), nf, MAX_ENERGY_DIFFERENCE, |i, j| {
+            worst_entry("interface_mass", "B' M B = I", (nf, nf), MAX_ENERGY_DIFFERENCE, |i, j| {
                 (inertia[(i, j)] - identity(i, j), of_inertia[(i, j)])
             }),
         ];
@@ -85,14 +85,18 @@ impl Parts {
             let (expected, found, r) = (self.rigid_mass(), twice(mass, &rigid), rigid.ncols());
             let size = |i: usize, j: usize| (expected[(i, i)] * expected[(j, j)]).sqrt();
             let of_mass = sums(mass, &rigid);
-            let formula = ("interface_rigid_mass", "R' M R = [m, -c~; c~, I0]");
-            checks.push(worst_entry(formula, r, MAX_ENERGY_DIFFERENCE, |i, j| {
-                ((found[(i, j)] - expected[(i, j)]) / size(i, j), of_mass[(i, j)] / size(i, j))
-            }));
+            let formula = "R' M R = [m, -c~; c~, I0]";
+            checks.push(worst_entry(
+                "interface_rigid_mass",
+                formula,
+                (r, r),
+                MAX_ENERGY_DIFFERENCE,
+                |i, j| ((found[(i, j)] - expected[(i, j)]) / size(i, j), of_mass[(i, j)] / size(i, j)),
+            ));
             let (energy, first) = (twice(stiffness, &rigid), root.first().map_or(1.0, |root| root * root));
             let of_energy = sums(stiffness, &rigid);
-            let formula = ("interface_rigid_motion", "R' K R = 0 beside lambda_1 R' M R");
-            checks.push(worst_entry(formula, r, of_stiffness, |i, j| {
+            let formula = "R' K R = 0 beside lambda_1 R' M R";
+            checks.push(worst_entry("interface_rigid_motion", formula, (r, r), of_stiffness, |i, j| {
                 let size = first * size(i, j);
                 (energy[(i, j)] / size, of_energy[(i, j)] / size)
             }));
@@ -149,30 +153,28 @@ impl Parts {
     }
 }
 
-fn magnitudes(a: &Mat<f64>) -> Mat<f64> {
+/// Returns the magnitudes of all entries.
+pub(crate) fn magnitudes(a: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)].abs())
 }
 
-/// Returns the check of the entry of an n x n matrix that comes closest to its limit, or exceeds it most: `limit` and the
-/// rounding error of the summands of the entry.
+/// Returns the check of the entry of a matrix that comes closest to its limit, or exceeds it most: `limit` and the rounding
+/// error of the summands of the entry.
 ///
 /// * `entry`: returns the deviation of an entry from its identity, and the sum of the magnitudes of its summands.
-fn worst_entry(
-    (name, formula): (&'static str, &'static str),
-    n: usize,
+pub(crate) fn worst_entry(
+    name: &'static str,
+    formula: &'static str,
+    (rows, columns): (usize, usize),
     limit: f64,
     entry: impl Fn(usize, usize) -> (f64, f64),
 ) -> IdentityCheck {
-    let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let entries = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     let check = |(i, j): (usize, usize)| {
         let (deviation, sum) = entry(i, j);
         IdentityCheck::new(name, formula, deviation.abs(), limit + SUMMAND_ROUNDING * sum)
     };
-    let worse = |a: IdentityCheck, b: IdentityCheck| {
-        let is_worse = b.value.is_nan() || b.value / b.limit > a.value / a.limit;
-        if is_worse { b } else { a }
-    };
-    entries.map(check).fold(IdentityCheck::new(name, formula, 0.0, limit), worse)
+    entries.map(check).fold(IdentityCheck::new(name, formula, 0.0, limit), IdentityCheck::or_worse)
 }
 
 // Cross-checks between parts of a body that no theorem about a single part covers (theory section 10).

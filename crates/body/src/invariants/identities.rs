@@ -42,6 +42,12 @@ impl IdentityCheck {
     pub fn new(name: &'static str, formula: &'static str, value: f64, limit: f64) -> Self {
         Self { name, formula, value, limit, passed: value <= limit }
     }
+
+    /// Returns the check that comes closer to its limit, or exceeds it more.
+    pub(crate) fn or_worse(self, other: Self) -> Self {
+        let is_worse = other.value.is_nan() || other.value / other.limit > self.value / self.limit;
+        if is_worse { other } else { self }
+    }
 }
 
 /// Claims of a body, which decide the identities that apply.
