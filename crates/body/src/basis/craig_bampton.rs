@@ -409,7 +409,6 @@ impl<'a> Parts<'a> {
             subtract_combination(deformed.as_mut(), rigid, along.as_ref());
         }
         let stiffness = gram(deformed.as_ref(), pencil.apply_stiffness(deformed.as_ref()).as_ref());
-        let stiffness = without_rigid(stiffness, &coordinates_of(self.joints, rigid));
         let shapes = side_by_side(&[self.constraint.as_ref(), self.fixed_shapes().as_ref()]);
         let mass = gram(shapes.as_ref(), pencil.apply_mass(shapes.as_ref()).as_ref());
         let mean = |a: &Mat<f64>, i: usize, j: usize| 0.5 * (a[(i, j)] + a[(j, i)]);
@@ -510,17 +509,6 @@ fn restore_rigid_motion(
     constraint: &mut Mat<f64>,
 ) -> Option<()> {
     let q = coordinates_of(joints, rigid);
-    let inverse = inverse_of_rigid(&q)?;
-    for _ in 0..2 {
-        let mut missing = rigid.to_owned();
-        subtract_combination(missing.as_mut(), constraint.as_ref(), q.as_ref());
-        add_combination(constraint.as_mut(), missing.as_ref(), inverse.as_ref());
-    }
-    Some(())
-}
-
-/// Returns Q^+ (r x c) with Q^+ Q = I, for the interface coordinates Q (c x r) of rigid motions.
-fn inverse_of_rigid(q: &Mat<f64>) -> Option<Mat<f64>> {
     let scale: Vec<f64> = (0..q.nrows()).map(|i| q.row(i).norm_l2()).collect();
     // Scale the coordinates to one size: rotations and displacements have different units.
     let weighted =
@@ -534,16 +522,13 @@ fn inverse_of_rigid(q: &Mat<f64>) -> Option<Mat<f64>> {
     let eigen = symmetric_eigen(gram(weighted.as_ref(), q.as_ref()).as_ref())?;
     let root = Mat::from_fn(q.ncols(), q.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
     let root = combine(root.as_ref(), root.as_ref().transpose());
-    Some(combine(root.as_ref(), weighted.as_ref().transpose()))
-}
-
-/// Returns (1 - Q Q^+)'K (1 - Q Q^+), a stiffness in interface coordinates without the rounding of the energy of rigid
-/// motions, whose coordinates are Q. Returns K if these have no inverse.
-fn without_rigid(stiffness: Mat<f64>, q: &Mat<f64>) -> Mat<f64> {
-    let Some(inverse) = inverse_of_rigid(q) else { return stiffness };
-    let mut projector = Mat::<f64>::identity(q.nrows(), q.nrows());
-    subtract_combination(projector.as_mut(), q.as_ref(), inverse.as_ref());
-    gram(projector.as_ref(), combine(stiffness.as_ref(), projector.as_ref()).as_ref())
+    let inverse = combine(root.as_ref(), weighted.as_ref().transpose());
+    for _ in 0..2 {
+        let mut missing = rigid.to_owned();
+        subtract_combination(missing.as_mut(), constraint.as_ref(), q.as_ref());
+        add_combination(constraint.as_mut(), missing.as_ref(), inverse.as_ref());
+    }
+    Some(())
 }
 
 /// Returns C'u, the interface coordinates of displacements (N x k).

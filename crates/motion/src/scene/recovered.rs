@@ -117,6 +117,11 @@ fn modal_columns(file: &InputFile, body: &FlexBody) -> (bool, impl Fn(&str) -> V
     (is_in_mean_axes, move |prefix| (1..=count).map(|j| format!("{modes}{prefix}_{j}")).collect())
 }
 
+/// Returns true for the table of a prescribed motion that does not name mean axes.
+fn names_carrier(file: &InputFile) -> bool {
+    has_column(file, REACTION) && ![CONDITIONS, IN_MEAN_AXES].iter().any(|column| has_column(file, column))
+}
+
 impl LoadedHistory {
     /// Reads the columns `time`, `q_1` to `q_n` (or, for a body whose frame is on an interface, `mean_axes_q_1` to
     /// `mean_axes_q_n`, so the rates and accelerations too), `angular_velocity_x` to `_z`; `qd_1` to `qd_n`, `qdd_1` to `qdd_n` and
@@ -196,9 +201,7 @@ impl LoadedHistory {
             named,
             time: all.times,
             carrier: None,
-            is_of_carried: has_column(&file, REACTION)
-                && !is_in_mean_axes
-                && ![CONDITIONS, IN_MEAN_AXES].iter().any(|column| has_column(&file, column)),
+            is_of_carried: !is_in_mean_axes && names_carrier(&file),
             is_in_mean_axes,
         })
     }
