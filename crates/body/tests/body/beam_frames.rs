@@ -142,7 +142,7 @@ fn plane_frames_with_lumped_masses_have_the_inertia_of_their_nodes() {
         let of_inertia = |kind: LoadKind, component: usize| {
             let load = UnitLoad { kind, component };
             let all = &body.inertia_stiffness().expect("turning nodes").stiffness;
-            all.iter().find(|one| one.load == load).expect("the load").matrix.clone()
+            all.iter().find(|own| own.load == load).expect("the load").matrix.clone()
         };
         let about_z = LoadKind::SPIN.iter().position(|pair| *pair == (2, 2)).expect("about z");
         let (spin, turn) =
@@ -199,7 +199,7 @@ fn changed_matrices_of_many_interfaces_are_found() {
             let coordinates = parts.coordinates.as_mut().expect("interface coordinates");
             change(if matrix == "mass" { &mut coordinates.mass } else { &mut coordinates.stiffness });
             let broken = failed(&FlexBody::new(parts).expect("no shape changed"));
-            assert!(broken.iter().any(|found| found.starts_with(check)), "{name} {matrix}: {broken:?}");
+            assert!(broken.iter().any(|name| name.starts_with(check)), "{name} {matrix}: {broken:?}");
         }
     }
 }

@@ -237,7 +237,7 @@ fn a_body_on_an_interface_keeps_its_geometric_stiffness_in_mean_axes() {
     assert!((psi.transpose() * &bar.m * bar.rigid()).amax() < 1e-9 * psi.amax() * bar.m.amax());
     assert_eq!(free.geometric_stiffness().len(), raw.data.geometric_stiffness.len());
     for given in &raw.data.geometric_stiffness {
-        let own = free.geometric_stiffness().iter().find(|one| one.load == given.load).expect("the load");
+        let own = free.geometric_stiffness().iter().find(|own| own.load == given.load).expect("the load");
         let expected = psi.transpose() * dense(&given.matrix.matrix) * &psi;
         let error = (converted_matrix(&own.matrix) - &expected).amax() / expected.amax();
         assert!(error < 1e-9, "{:?}: {error:e}", given.load);
