@@ -3,7 +3,7 @@
 
 use crate::basis::FREE_MODE;
 use crate::convert::interfaces_in_frame;
-use crate::flex_body::{FixedInterface, FlexBody, Interface, LumpedBody};
+use crate::flex_body::{FixedInterface, FlexBody, Interface, LumpedBody, magnitudes, worst_entry};
 use crate::invariants::{IdentityCheck, error_norms};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -13,6 +13,10 @@ use std::collections::BTreeSet;
 
 /// Allowed rounding error of a rigid motion of the nodes of an interface, relative to its largest motion.
 const MAX_RIGID_ROUNDING: f64 = 1e-8;
+/// Motion relative to the largest of the modes below which an interface counts as at rest, such as the interface that
+/// carries the frame: its nodes move by the rounding of the rigid motion that was taken from the modes, 1e-12 of their
+/// largest motion.
+const MAX_MOTION_AT_REST: f64 = 1e-3;
 /// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
 const MAX_NORM_ROUNDING: f64 = 1e-9;
 /// Allowed rounding error between coordinates computed from the shapes in two ways.
@@ -93,9 +97,9 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     let rows =
         interface.rows(body.nodes(), modes.shape.as_ref(), rotation.map(Mat::as_ref), body.dimension());
     let Some(rows) = rows else { return f64::INFINITY };
-    let displaced = rows.deformation().1;
+    let displaced = rows.deformation_beside(MAX_MOTION_AT_REST * modes.shape.norm_max());
     let (Some(rotation), Some(turns)) = (rotation, &rows.rotation) else { return displaced };
-    let (mut left, mut size) = (0.0, turns.norm_max());
+    let (mut left, mut size) = (0.0, larger(turns.norm_max(), MAX_MOTION_AT_REST * rotation.norm_max()));
     for &node in &interface.nodes {
         for k in 0..3 {
             let row = rotation.as_ref().subrows(3 * node + k, 1);
@@ -115,21 +119,22 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
 fn coordinates_of_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let coordinates = body.coordinates()?;
     let rigid = body.parts().rigid_coordinates()?;
-    let b = &coordinates.of_modes;
-    let momentum = gram(rigid.as_ref(), combine(coordinates.mass.as_ref(), b.as_ref()).as_ref());
-    let inertia = body.parts().rigid_mass();
-    let momentum = (0..momentum.nrows()).flat_map(|i| {
-        let (momentum, size) = (&momentum, inertia[(i, i)].sqrt());
-        (0..momentum.ncols()).map(move |j| momentum[(i, j)].abs() / size)
-    });
-    let value = larger(largest(momentum), reference_difference(body, b));
+    let (b, mass, inertia) = (&coordinates.of_modes, &coordinates.mass, body.parts().rigid_mass());
+    let product =
+        |r: &Mat<f64>, m: &Mat<f64>, b: &Mat<f64>| gram(r.as_ref(), combine(m.as_ref(), b.as_ref()).as_ref());
+    let momentum = product(&rigid, mass, b);
+    let sums = product(&magnitudes(&rigid), &magnitudes(mass), &magnitudes(b));
     let certificate = body.certificate();
     let limit = MAX_COORDINATE_ROUNDING
         + 10.0 * certificate.rigid_noise
         + certificate.eigenvalue_rounding
         + body.storage().rounding();
-    let formula = "B = reference points in the modes; R' M B = 0";
-    Some(IdentityCheck::new("interface_modes", formula, value, limit))
+    let (name, formula) = ("interface_modes", "B = reference points in the modes; R' M B = 0");
+    let of_momentum = worst_entry(name, formula, (momentum.nrows(), momentum.ncols()), limit, |i, j| {
+        let size = inertia[(i, i)].sqrt();
+        (momentum[(i, j)] / size, sums[(i, j)] / size)
+    });
+    Some(of_momentum.or_worse(IdentityCheck::new(name, formula, reference_difference(body, b), limit)))
 }
 
 /// Returns the largest difference of the coordinates of reference points from their motion in the modes;

@@ -7,8 +7,8 @@ use faer::{ColRef, Mat, MatRef};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Analysis, Cholesky, DoubleDouble, Inertia, Pencil, Solve, SymmetricMatrix, Tall, column_norms, combine,
-    combine_in_place, combine_into, gram, largest, projection_compensated, small_pencil, subtract_columns,
-    subtract_combination, sum_terms, symmetric_eigen,
+    combine_in_place, combine_into, dense_cholesky, gram, largest, left_singular_vectors,
+    projection_compensated, small_pencil, subtract_columns, subtract_combination, sum_terms, symmetric_eigen,
 };
 use std::ops::Range;
 
@@ -67,6 +67,14 @@ const DEPENDENT_SQUARED_NORM: f64 = 1e-8;
 /// Largest number of modes whose projections are computed in double-double arithmetic. The time of such small
 /// eigenproblems grows with the third power, and is a second with 200.
 const MAX_SHARPENED_MODES: usize = 200;
+
+/// Ratio of eigenvalues up to which the rounding of a small eigenproblem couples its modes by less than
+/// [`MAX_COUPLING`]: 2e-16 times this ratio.
+const WIDE_SPREAD: f64 = 4e4;
+
+/// Coupling of two modes by K, relative to the root of the product of their eigenvalues, that is left as rounding. Bodies
+/// whose modes are coupled by 1e-9 are refused.
+const MAX_COUPLING: f64 = 1e-11;
 
 /// Number of columns whose products with K and M are held at a time. The products of 200 modes would take twice the
 /// memory of the modes, and newly allocated memory is cleared first, which takes longer than the products.
@@ -270,6 +278,33 @@ impl Refined {
         let Some(ritz) = small_pencil(stiffness, &mass) else { return self };
         let eigenvalues: Vec<f64> = ritz.values.iter().map(|lambda| lambda.hi).collect();
         let vectors = combine(x, ritz.vectors.as_ref());
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), context);
+        Self { eigenvalues, vectors, residuals, floors }
+    }
+
+    /// Removes the coupling of the modes by K that rounding of the small eigenproblem leaves, relative to the highest
+    /// eigenvalue, where eigenvalues differ [widely](WIDE_SPREAD).
+    pub(super) fn uncoupled(self, problem: &EigenProblem<'_>, context: &Context<'_>) -> Self {
+        let lambda = &self.eigenvalues;
+        let is_wide =
+            lambda.first().zip(lambda.last()).is_some_and(|(first, last)| *last > WIDE_SPREAD * first);
+        if !is_wide || lambda[0] <= 0.0 {
+            return self;
+        }
+        let x = self.vectors.as_ref();
+        context.count(|work| work.stiffness_columns += x.ncols() as u64);
+        let product = gram(x, problem.pencil.apply_stiffness(x).as_ref());
+        let stiffness = Mat::from_fn(x.ncols(), x.ncols(), |i, j| 0.5 * (product[(i, j)] + product[(j, i)]));
+        let beside = |i: usize, j: usize| stiffness[(i, j)].abs() / (lambda[i] * lambda[j]).sqrt();
+        let pairs = (0..x.ncols()).flat_map(|j| (0..j).map(move |i| (i, j)));
+        if largest(pairs.map(|(i, j)| beside(i, j))) <= MAX_COUPLING {
+            return self;
+        }
+        // Rotations of pairs of rows of the Cholesky factor keep the digits of every eigenvalue.
+        let rotated = dense_cholesky(stiffness).and_then(left_singular_vectors);
+        let Some((roots, rotation)) = rotated else { return self };
+        let eigenvalues: Vec<f64> = roots.iter().map(|root| root * root).collect();
+        let vectors = combine(x, rotation.as_ref());
         let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), context);
         Self { eigenvalues, vectors, residuals, floors }
     }

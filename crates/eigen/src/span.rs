@@ -35,7 +35,8 @@ pub fn modes_of_span(
 ) -> Result<EigenSolution, EigenFailure> {
     let refined = Refined::new(problem, basis, context)?;
     // At any accuracy: there is no search, so the modes are only as accurate as this step makes them.
-    let refined = refined.sharpened(problem, Accuracy::Standard.residual(), context);
+    let refined =
+        refined.sharpened(problem, Accuracy::Standard.residual(), context).uncoupled(problem, context);
     check_zero_energy(problem, &refined)?;
     let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, context);
     let exact = modes.exact(settings.accuracy);

@@ -22,7 +22,7 @@ pub struct ModelLoad {
 }
 
 /// Columns of the tables of runs whose names no load may have, since its own column has its name.
-const OTHER_COLUMNS: [&str; 4] = ["time", "kinetic", "elastic", "work"];
+const OTHER_COLUMNS: [&str; 5] = ["time", "kinetic", "elastic", "work", "mean_axes"];
 
 /// Beginnings of the names of such columns, before a number or an axis.
 const OTHER_VECTORS: [&str; 15] = [

@@ -12,7 +12,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{CscMatrix, larger};
 use nalgebra::Vector3;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use strum::{EnumString, IntoStaticStr, VariantArray, VariantNames};
 
@@ -178,11 +178,19 @@ pub struct ModelRecovery {
 /// Longest name of a recovery in bytes, since the name becomes a group name in the file.
 const MAX_NAME_BYTES: usize = 200;
 
-/// Largest value of a row of stress, strain, force or moment under a rigid motion, relative to the sum of the
-/// magnitudes of its terms, about the middle of its own nodes. Operators of sound models reach 1e-16, written with six
+/// Largest value of a row of stress, strain, force or moment under a rigid motion, relative to the largest sum of the
+/// magnitudes of its terms under any, about the middle of its own nodes. Operators of sound models reach 1e-16, written with six
 /// digits 1e-5; exchanged nodes and exchanged directions give 1e-2 to 1 in the rows concerned. A larger limit lets
 /// exchanged nodes pass.
 const MAX_RIGID_RESPONSE: f64 = 1e-3;
+
+/// Value of a row under a rigid motion, relative to the largest sum of a row of its quantity and unit, below which the row
+/// is rounding: a row that vanishes for every motion, such as a stress in a direction without stiffness. Products and
+/// averages of a thousand terms leave 1e-13; a larger limit lets wrong rows of very soft parts pass.
+const ROW_ROUNDING: f64 = 1e-12;
+
+/// Extent of the nodes of a row, relative to that of the body, below which they count as one place.
+const ONE_PLACE: f64 = 1e-9;
 
 /// Rows of the files of a model and their way to the internal order.
 pub(crate) struct RowsOfFiles<'a> {
@@ -404,10 +412,25 @@ pub(crate) fn check_rigid_responses(all: &[ModelRecovery], rows: &Rows, nodes: &
 
 fn strained(recovery: &ModelRecovery, fields: &Mat<f64>, rows: &Rows) -> Option<Diagnostic> {
     let RecoveryOperator::Rows { transposed, labels, .. } = &recovery.operator else { return None };
-    let response = |j: usize| response_to_rigid_motion(transposed.column(j), fields, rows);
-    let checked = (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion());
+    let checked: Vec<usize> =
+        (0..labels.len()).filter(|&j| labels[j].quantity.ignores_rigid_motion()).collect();
+    let d = rows.dimension;
+    let extent = (0..rows.nodes).map(|node| place(node, fields, d).norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let responses: Vec<RigidResponse> =
+        checked.iter().map(|&j| RigidResponse::of(transposed.column(j), fields, rows, extent)).collect();
+    // Values of different units cannot be compared.
+    let mut largest: HashMap<(&str, &str), f64> = HashMap::new();
+    let kind = |j: usize| (labels[j].quantity.name(), labels[j].unit.as_str());
+    for (&j, response) in checked.iter().zip(&responses) {
+        let size = largest.entry(kind(j)).or_default();
+        *size = size.max(response.size);
+    }
+    let part = |(&j, response): (&usize, &RigidResponse)| {
+        let is_rounding = response.value <= ROW_ROUNDING * largest[&kind(j)];
+        (j, if is_rounding { 0.0 } else { response.value / response.size })
+    };
     let wrong: Vec<(usize, f64)> =
-        checked.map(|j| (j, response(j))).filter(|(_, part)| *part > MAX_RIGID_RESPONSE).collect();
+        checked.iter().zip(&responses).map(part).filter(|(_, part)| *part > MAX_RIGID_RESPONSE).collect();
     let &(worst, part) = first_largest(&wrong, |pair| pair.1)?;
     let row = &labels[worst];
     let message = format!(
@@ -421,31 +444,49 @@ fn strained(recovery: &ModelRecovery, fields: &Mat<f64>, rows: &Rows) -> Option<
     Some(Diagnostic::new(Code::RecoveryStrained, message).in_file(&recovery.path))
 }
 
-/// Returns the largest |sum r_i t_i| / sum |r_i t_i| of a row r over the rigid motions t: translations, and rotations
-/// about the middle of the nodes of the row.
-///
-/// * `fields`: rigid motions about the centre of the body, rotations with unit angle.
-fn response_to_rigid_motion((at, values): (&[u32], &[f64]), fields: &Mat<f64>, rows: &Rows) -> f64 {
-    let d = rows.dimension;
-    let middle = middle_of(at, fields, d, d * rows.nodes);
-    let part = |c: usize| {
-        // A rotation about the middle is one about the centre less the translation of the middle.
-        let shift = match c.checked_sub(d) {
-            Some(turn) => Vector3::ith(if d == 2 { 2 } else { turn }, 1.0).cross(&middle),
-            None => Vector3::zeros(),
-        };
-        let term = |(&row, value): (&u32, &f64)| {
-            let translated: f64 = (0..d).map(|k| shift[k] * fields[(row as usize, k)]).sum();
-            value * (fields[(row as usize, c)] - translated)
-        };
-        let (sum, size) = at
-            .iter()
-            .zip(values)
-            .map(term)
-            .fold((0.0, 0.0), |(sum, size): (f64, f64), term| (sum + term, size + term.abs()));
-        if size > 0.0 { sum.abs() / size } else { 0.0 }
-    };
-    (0..rigid_count(d)).map(part).fold(0.0, larger)
+/// Response of a row r to the rigid motions t that move none of its nodes by more than one: translations, and rotations
+/// about the middle of its nodes.
+struct RigidResponse {
+    /// Largest |sum r_i t_i|.
+    value: f64,
+    /// Largest sum |r_i t_i|. Entries that vanish but for rounding may be all that one motion moves: the value is
+    /// compared with the sum of the motion with the largest.
+    size: f64,
+}
+
+impl RigidResponse {
+    /// Returns the response of a row with entries `values` at the rows `at` of the matrices.
+    ///
+    /// * `fields`: rigid motions about the centre of the body, rotations with unit angle.
+    /// * `extent`: largest distance of a node from there.
+    fn of((at, values): (&[u32], &[f64]), fields: &Mat<f64>, rows: &Rows, extent: f64) -> Self {
+        let d = rows.dimension;
+        let middle = middle_of(at, fields, d, d * rows.nodes);
+        // Rotations displace the farthest node by one; a row of a single place has the extent of the body.
+        let displaced = at.iter().map(|&row| row as usize).filter(|row| *row < d * rows.nodes);
+        let reach = displaced.map(|row| (place(row / d, fields, d) - middle).norm()).fold(0.0, f64::max);
+        let length = if reach > ONE_PLACE * extent { reach } else { extent };
+        let mut response = Self { value: 0.0, size: 0.0 };
+        for c in 0..rigid_count(d) {
+            // A rotation about the middle is one about the centre less the translation of the middle.
+            let (shift, unit) = match c.checked_sub(d) {
+                Some(turn) => (Vector3::ith(if d == 2 { 2 } else { turn }, 1.0).cross(&middle), 1.0 / length),
+                None => (Vector3::zeros(), 1.0),
+            };
+            let term = |(&row, value): (&u32, &f64)| {
+                let translated: f64 = (0..d).map(|k| shift[k] * fields[(row as usize, k)]).sum();
+                value * (fields[(row as usize, c)] - translated) * unit
+            };
+            let (sum, size) = at
+                .iter()
+                .zip(values)
+                .map(term)
+                .fold((0.0, 0.0), |(sum, size): (f64, f64), term| (sum + term, size + term.abs()));
+            (response.value, response.size) =
+                (larger(response.value, sum.abs()), larger(response.size, size));
+        }
+        response
+    }
 }
 
 /// Returns the mean position, from the centre of the body, of the nodes whose displacements are in `at`; `displaced`
@@ -455,15 +496,17 @@ fn middle_of(at: &[u32], fields: &Mat<f64>, d: usize, displaced: usize) -> Vecto
         at.iter().map(|&row| row as usize).filter(|row| *row < displaced).map(|row| row / d).collect();
     nodes.sort_unstable();
     nodes.dedup();
-    let place = |node: usize| {
-        if d == 2 {
-            return Vector3::new(fields[(2 * node + 1, 2)], -fields[(2 * node, 2)], 0.0);
-        }
-        // e_z moves x along y by x, e_x along z by y, and e_y along x by z.
-        Vector3::new(fields[(3 * node + 1, 5)], fields[(3 * node + 2, 3)], fields[(3 * node, 4)])
-    };
     let count = nodes.len().max(1) as f64;
-    nodes.into_iter().map(place).sum::<Vector3<f64>>() / count
+    nodes.into_iter().map(|node| place(node, fields, d)).sum::<Vector3<f64>>() / count
+}
+
+/// Returns the position of a node from the centre of the body.
+fn place(node: usize, fields: &Mat<f64>, d: usize) -> Vector3<f64> {
+    if d == 2 {
+        return Vector3::new(fields[(2 * node + 1, 2)], -fields[(2 * node, 2)], 0.0);
+    }
+    // e_z moves x along y by x, e_x along z by y, and e_y along x by z.
+    Vector3::new(fields[(3 * node + 1, 5)], fields[(3 * node + 2, 3)], fields[(3 * node, 4)])
 }
 
 /// Returns the parts of the recoveries that belong to the body with the rows `kept` and the `nodes`: an operator with

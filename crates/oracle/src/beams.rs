@@ -1,5 +1,6 @@
 //! Small frames of beams: nodes with three displacements and three rotations.
 
+use crate::random::Random;
 use faer::Mat;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{DofLabel, Nodes, RawModel};
@@ -14,6 +15,8 @@ pub enum BeamMass {
     Rotary,
     /// Lumped mass: half of every beam at each of its nodes, nothing on the rotations.
     Lumped,
+    /// Lumped mass with the inertia of half a beam on the rotations of its nodes, equal about all axes.
+    LumpedRotary,
 }
 
 /// Young's modulus of [`shaft`], whose density is 1.
@@ -90,6 +93,41 @@ pub fn shaft(parts: usize, width: f64) -> RawModel {
     frame("shaft", &positions, &beams, &section, BeamMass::Rotary)
 }
 
+/// Returns a random tree of `count` nodes, each joined by a beam to the nearest node before it. In the plane z = 0 the
+/// nodes have two displacements and the rotation about z.
+pub fn tree(random: &mut Random, count: usize, is_plane: bool, mass: BeamMass) -> RawModel {
+    let mut positions = vec![[0.0; 3]];
+    let mut beams = Vec::new();
+    while positions.len() < count {
+        let [x, y, z] = random.vector::<3>();
+        let place = Vector3::new(x, y, if is_plane { 0.0 } else { z }) * (count as f64).sqrt();
+        let distance = |node: &usize| (Vector3::from(positions[*node]) - place).norm();
+        let nearest =
+            (0..positions.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a node");
+        if distance(&nearest) > 0.2 {
+            beams.push((nearest, positions.len()));
+            positions.push(place.into());
+        }
+    }
+    let section = Section { width: 0.05, youngs: 4.0, shear: 1.5, density: 1.0 };
+    let raw = frame("tree of beams", &positions, &beams, &section, mass);
+    if is_plane { in_plane(raw) } else { raw }
+}
+
+/// Returns the model with the displacements along x and y and the rotation about z alone.
+fn in_plane(raw: RawModel) -> RawModel {
+    let rows: Vec<u32> =
+        (0..raw.stiffness.matrix.n_rows() as u32).filter(|row| [0, 1, 5].contains(&(row % 6))).collect();
+    let place = |row: u32| rows.binary_search(&row).ok().map(|at| at as u32);
+    let part = |a: &CscMatrix| {
+        let entries = crate::mesh::entries(a).filter_map(|(i, j, v)| Some((place(i)?, place(j)?, v)));
+        CscMatrix::from_triplets(rows.len(), rows.len(), &entries.collect::<Vec<_>>())
+    };
+    let (k, m) = (part(&raw.stiffness.matrix), part(&raw.mass.matrix));
+    let labels = raw.dofs.as_ref().map(|all| rows.iter().map(|row| all[*row as usize]).collect());
+    RawModel { dofs: labels, dimension: 2, ..RawModel::in_memory("plane tree of beams", k, m, raw.nodes) }
+}
+
 /// Returns the model of beams of one section between nodes.
 fn frame(
     name: &str,
@@ -131,9 +169,11 @@ impl Section {
         let m = match mass {
             BeamMass::Consistent => self.consistent(length),
             BeamMass::Rotary => self.consistent(length) + self.rotary(length),
-            BeamMass::Lumped => {
+            BeamMass::Lumped | BeamMass::LumpedRotary => {
                 let half = 0.5 * self.density * self.width * self.width * length;
-                Mat::from_fn(12, 12, |i, j| if i == j && i % 6 < 3 { half } else { 0.0 })
+                let turning = if mass == BeamMass::Lumped { 0.0 } else { half * length * length / 12.0 };
+                let of_row = |row: usize| if row % 6 < 3 { half } else { turning };
+                Mat::from_fn(12, 12, |i, j| if i == j { of_row(i) } else { 0.0 })
             }
         };
         let turned = |a: Mat<f64>| &turn * a * turn.transpose();

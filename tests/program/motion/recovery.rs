@@ -280,6 +280,30 @@ fn rows_with_forces_of_motion_are_those_of_the_table() {
     ["qd_", "qdd_", "angular_acceleration_"].into_iter().for_each(without);
 }
 
+/// The table of a body that turns with a prescribed spin is taken as it is, also of a body without W3, whose torque of mean
+/// axes is not known, and in whose table no column of this torque tells the frame.
+#[test]
+fn a_table_of_a_prescribed_spin_is_no_table_of_a_carried_body() {
+    let (folder, _) = folder();
+    let place = folder.path();
+    let manifest = fs::read_to_string(place.join("model.toml")).expect("a manifest");
+    let manifest =
+        manifest.replace("rows = \"rows.csv\"\n", "rows = \"rows.csv\"\ndeformed_inertia = true\n");
+    fs::write(place.join("model.toml"), manifest).expect("written");
+    let spin = "[run]\nduration = 2e-4\noutputs = 10\n[spin]\naxis = [0, 0, 1]\nrate = 300\n";
+    fs::write(place.join("scene.toml"), spin).expect("written");
+    runs(place, "convert model.toml --modes 6 -o whole.h5 --quiet");
+    runs(place, "reduce whole.h5 --terms W1 -o reduced.h5 --quiet");
+    for (body, conditions) in [("whole", "conditions_torque_x"), ("reduced", "mean_axes")] {
+        runs(place, &format!("simulate {body}.h5 --scene scene.toml --csv run.csv --rows right.csv --quiet"));
+        let table = columns(&place.join("run.csv"));
+        assert!(table.iter().any(|(name, _)| name == conditions), "{body}");
+        runs(place, &format!("recover {body}.h5 --history run.csv -o again.csv --quiet"));
+        let read = |name: &str| fs::read_to_string(place.join(name)).expect("a table");
+        assert_eq!(read("again.csv"), read("right.csv"), "{body}");
+    }
+}
+
 /// Compares the rows of `simulate` with those that `recover` computes from its table, of the body `body.h5` in `place`.
 ///
 /// * `beta`: of damping in proportion to the stiffness, by which static columns are late. Between the rows of the table,

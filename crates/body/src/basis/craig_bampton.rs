@@ -14,6 +14,7 @@ use super::held_interfaces::{check_prescribable, hold, unit_motions};
 use super::interface_rows::{
     CoordinatesInModelAxes, CoupledInterface, InterfaceCoordinates, coupled_interfaces,
 };
+use super::massless::{MasslessMotions, ShapesWithMass};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span, rigid_modes};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::{BasisKind, FixedInterface, ModeSettings};
@@ -61,18 +62,25 @@ impl Basis for CraigBampton {
         let failed = |failure| explain(model, failure);
         // Remove rigid motion and dependent shapes.
         let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
-        let found = independent(&problem.pencil, rigid.as_ref(), shapes, MIN_SHAPE_REMAINDER)
-            .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+        let massless = MasslessMotions::new(model);
+        let found =
+            independent(&problem.pencil, rigid.as_ref(), shapes, MIN_SHAPE_REMAINDER, massless.as_ref())
+                .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+        let heavy = massless.as_ref().and_then(|massless| massless.removed_from(&found.vectors));
+        let light = heavy.as_ref().map_or(0, |heavy| heavy.removed);
         let mut notes = parts.notes(model, settings);
-        notes.extend(parts.removed(&found, rigid_count(model.dimension())));
-        if found.retained.is_empty() {
+        notes.extend(parts.removed(&found, rigid_count(model.dimension()), light));
+        let lost = massless.as_ref().zip(heavy.as_ref());
+        notes.extend(lost.map(|(massless, heavy)| parts.nearly_massless(model, massless, heavy)));
+        if found.retained.len() == light {
             return Err(nothing_deforms().into());
         }
         // Solve the small eigenproblem in the span.
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
-        let whole = parts.misses_only_rigid_motions(&found, rigid_count(model.dimension()));
+        let whole = light == 0 && parts.misses_only_rigid_motions(&found, rigid_count(model.dimension()));
         let span = found.vectors;
-        let mut solution = modes_of_span(&problem, span.clone(), &all, context).map_err(failed)?;
+        let basis = heavy.map_or_else(|| span.clone(), |heavy| heavy.vectors);
+        let mut solution = modes_of_span(&problem, basis, &all, context).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
         let provenance = parts.provenance(&found.retained, parted.as_ref());
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
@@ -235,15 +243,16 @@ impl<'a> Parts<'a> {
         largest_shares(parted).into_iter().map(described).collect()
     }
 
-    /// Returns the diagnostics about removed shapes.
-    fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
+    /// Returns the diagnostics about removed shapes. `light`: number of combinations of the others that are left out since
+    /// they carry nearly no mass.
+    fn removed(&self, found: &Independent, rigid: usize, light: usize) -> Vec<Diagnostic> {
         let removed = Self::removed_shapes(found);
         let all = found.retained.len() + removed.len();
         let note = if self.misses_only_rigid_motions(found, rigid) {
             let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
             let message = format!(
                 "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame performs: with {fixed} fixed-interface modes the body has {} modes",
-                found.retained.len()
+                found.retained.len() - light
             );
             Diagnostic::new(Code::ShapesRigid, message)
                 .with_help("nothing to do: every Craig-Bampton body is counted in this way")
@@ -257,6 +266,28 @@ impl<'a> Parts<'a> {
             Diagnostic::new(Code::ShapesDependent, message)
         };
         vec![note]
+    }
+
+    /// Returns the warning about combinations of shapes that are left out of `heavy`.
+    fn nearly_massless(
+        &self,
+        model: &FeModel,
+        massless: &MasslessMotions<'_>,
+        heavy: &ShapesWithMass,
+    ) -> Diagnostic {
+        let given = self.fixed.eigenvalues.len();
+        let message = format!(
+            "{} combinations of shapes with modes from {} Hz on are left out since they carry nearly no mass beside the {given} fixed-interface modes: the body lacks this local flexibility of its interfaces under loads on rotations and nodes without mass",
+            heavy.removed,
+            significant(model.units().frequency_of(heavy.from), 4),
+        );
+        let most = massless.most_beside(&self.fixed_shapes(), &self.constraint);
+        let mass = "give the rotations of the nodes their mass";
+        let help = match most.filter(|most| (1..given).contains(most)) {
+            Some(most) => format!("to keep it ask for at most {most} modes, or {mass}"),
+            None => format!("to keep it {mass}"),
+        };
+        Diagnostic::new(Code::ShapesDependent, message).with_help(help)
     }
 
     /// Returns the composition of the basis. `whole`: the basis spans all motions of the interfaces, a

@@ -109,7 +109,7 @@ impl Basis for ImportedShapes {
         let criterion = self.dependent();
         let (one, several) = self.names();
         let failed = |failure| explain(model, failure);
-        let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
+        let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion, None)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
         let notes = independent.notes(several, criterion, |j| format!("shape {}", j + 1));
         if independent.retained.is_empty() {

@@ -2,6 +2,7 @@
 //! is M-orthonormalised, and the small eigenproblem is solved. Every identity of theory section 10 then
 //! holds for any shapes.
 
+use super::massless::MasslessMotions;
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::ties::first_largest;
@@ -42,7 +43,8 @@ pub(super) struct Independent {
 /// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns
 /// in their order by the modified Gram-Schmidt process, repeated once. Columns whose relative M-norm falls
 /// below `dependent` after projection against the columns before them, or after removal of rigid motion,
-/// are dropped.
+/// are dropped, and so are columns that move no mass. The square of such a column may be rounding, which only the `motions`
+/// without mass of the model tell.
 ///
 /// Returns `None` if M is indefinite: a column has a negative squared M-norm beyond rounding.
 pub(super) fn independent(
@@ -50,8 +52,9 @@ pub(super) fn independent(
     rigid: MatRef<'_, f64>,
     shapes: Mat<f64>,
     dependent: f64,
+    motions: Option<&MasslessMotions<'_>>,
 ) -> Option<Independent> {
-    let mut set = ShapeSet::new(pencil, shapes);
+    let mut set = ShapeSet::new(pencil, shapes, motions);
     set.scale_to_unit_size();
     set.scale_to_unit_mass()?;
     // Remove rigid motion twice: a shape may differ from a rigid motion only in its last digits.
@@ -66,6 +69,7 @@ pub(super) fn independent(
 /// Working set of the shapes during orthonormalisation.
 struct ShapeSet<'a> {
     pencil: &'a Pencil<'a>,
+    motions: Option<&'a MasslessMotions<'a>>,
     mass_diagonal: Vec<f64>,
     shapes: Mat<f64>,
     /// True for each shape that is still in the set.
@@ -76,7 +80,7 @@ struct ShapeSet<'a> {
 }
 
 impl<'a> ShapeSet<'a> {
-    fn new(pencil: &'a Pencil<'a>, shapes: Mat<f64>) -> Self {
+    fn new(pencil: &'a Pencil<'a>, shapes: Mat<f64>, motions: Option<&'a MasslessMotions<'a>>) -> Self {
         let outcome = Independent {
             vectors: Mat::zeros(0, 0),
             retained: Vec::new(),
@@ -86,7 +90,7 @@ impl<'a> ShapeSet<'a> {
         };
         let is_in = vec![true; shapes.ncols()];
         let (mass_diagonal, without_mass) = (pencil.mass_diagonal(), Vec::new());
-        Self { pencil, mass_diagonal, shapes, is_in, without_mass, outcome }
+        Self { pencil, motions, mass_diagonal, shapes, is_in, without_mass, outcome }
     }
 
     /// Scales the shapes to unit size, so that their squares stay in the range of numbers for any unit.
@@ -112,9 +116,11 @@ impl<'a> ShapeSet<'a> {
             if square < -MASSLESS_SHAPE.sqrt() * bound {
                 return None;
             }
-            if square <= MASSLESS_SHAPE * bound {
+            let shape = self.shapes.as_ref().subcols(j, 1);
+            let is_massless = self.motions.is_some_and(|motions| motions.make_up(shape));
+            if square <= MASSLESS_SHAPE * bound || is_massless {
                 self.outcome.massless.push(j);
-                self.without_mass.push(self.shapes.as_ref().subcols(j, 1).to_owned());
+                self.without_mass.push(shape.to_owned());
                 self.is_in[j] = false;
             } else {
                 scale(&mut self.shapes, j, 1.0 / square.sqrt());
@@ -145,7 +151,7 @@ impl<'a> ShapeSet<'a> {
     /// Runs the Gram-Schmidt process; also returns removed directions without mass. The vectors found so
     /// far are the first columns of the shapes and of their products with M.
     fn orthonormalised(self, dependent: f64) -> (Independent, Vec<Mat<f64>>) {
-        let Self { pencil, mass_diagonal, mut shapes, is_in, mut without_mass, mut outcome } = self;
+        let Self { pencil, motions, mass_diagonal, mut shapes, is_in, mut without_mass, mut outcome } = self;
         let mut products = pencil.apply_mass(shapes.as_ref());
         for j in (0..shapes.ncols()).filter(|&j| is_in[j]) {
             let found = outcome.retained.len();
@@ -156,6 +162,11 @@ impl<'a> ShapeSet<'a> {
                     without_mass.push(vector);
                 }
                 outcome.dependent.push((j, left));
+                continue;
+            }
+            if motions.is_some_and(|motions| motions.make_up(vector.as_ref())) {
+                outcome.massless.push(j);
+                without_mass.push(vector);
                 continue;
             }
             // Compute the product with M directly: the updated product is a difference of larger numbers.

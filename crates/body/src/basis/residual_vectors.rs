@@ -484,7 +484,7 @@ impl<'a> Responses<'a> {
         // M-orthonormalise the others against rigid motions, modes and each other.
         let candidates = Mat::from_fn(self.beside.nrows(), used.len(), |i, j| self.beside[(i, used[j])]);
         let known = side_by_side(&[problem.rigid, modes]);
-        let found = independent(&problem.pencil, known.as_ref(), candidates, MIN_RESPONSE_REMAINDER)?;
+        let found = independent(&problem.pencil, known.as_ref(), candidates, MIN_RESPONSE_REMAINDER, None)?;
         let name = |j: usize| &names[used[j]];
         dropped.extend(
             found.dependent.iter().map(|&(j, left)| format!("{} ({})", name(j), norm_in_words(left))),

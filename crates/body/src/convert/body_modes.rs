@@ -11,8 +11,9 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_eigen::{Completeness, Proof, canonical_sign, relative_residual};
 use flexbody_linalg::{
-    SymmetricMatrix, combine, contiguous_mut, copied, dense_cholesky, gram, left_singular_vectors, multiply,
-    parallel, projection_compensated, solve_lower, solve_upper, subtract_combination, zeros,
+    SymmetricMatrix, combine, contiguous_mut, copied, dense_cholesky, gram, largest_entry,
+    left_singular_vectors, multiply, parallel, projection_compensated, solve_lower, solve_upper,
+    subtract_combination, zeros,
 };
 use flexbody_model::{Coupling, DirectorMass, FeModel, NodeMoments, Nodes, rigid_axes, rigid_count};
 use nalgebra::{Matrix3, Vector3};
@@ -368,21 +369,22 @@ pub(super) fn constrain(
     let rigid = model.rigid_fields(place.frame.origin.into(), 1.0);
     subtract_combination(shapes.as_mut(), rigid.as_ref(), taken.as_ref());
 
-    // m' = L L' and L^-1 diag(lambda)^(1/2) = U diag(mu)^(1/2) V' give X = L^-T U.
     let unresolved =
         || impossible(format!("the modes of the body held at interface `{name}` were not found"));
     let nf = taken.ncols();
     let added = taken.transpose() * rigid_mass(model, &place.frame) * &taken;
-    let mass = Mat::from_fn(nf, nf, |i, j| 0.5 * (added[(i, j)] + added[(j, i)]) + f64::from(i == j));
-    let lower = dense_cholesky(mass).ok_or_else(unresolved)?;
-    let roots: Vec<f64> = found.solution.eigenvalues.iter().map(|lambda| lambda.sqrt()).collect();
-    let root = Mat::from_fn(nf, nf, |i, j| if i == j { roots[i] } else { 0.0 });
-    let (values, left) = left_singular_vectors(solve_lower(&lower, &root)).ok_or_else(unresolved)?;
-    let modes = combine(shapes.as_ref(), solve_upper(&lower, &left).as_ref());
-    let eigenvalues: Vec<f64> = values.iter().map(|root| root * root).collect();
+    let mass = symmetric_part(&(added + Mat::<f64>::identity(nf, nf)));
+    let (mut eigenvalues, change) = normalised(mass, &found.solution.eigenvalues).ok_or_else(unresolved)?;
+    let mut modes = combine(shapes.as_ref(), change.as_ref());
+    let pencil = model.pencil();
+    // Where rigid motion is most of a mode, its mass is a small part of that of both.
+    let mass = gram(modes.as_ref(), pencil.apply_mass(modes.as_ref()).as_ref());
+    if largest_entry((&mass - Mat::<f64>::identity(nf, nf)).as_ref()) > MAX_MASS_ROUNDING {
+        let (values, change) = normalised(symmetric_part(&mass), &eigenvalues).ok_or_else(unresolved)?;
+        (eigenvalues, modes) = (values, combine(modes.as_ref(), change.as_ref()));
+    }
 
     // Residuals refer to the equations of the free body and include the reaction at the interface.
-    let pencil = model.pencil();
     let (kx, mx) = (pencil.apply_stiffness(modes.as_ref()), pencil.apply_mass(modes.as_ref()));
     let residual = |(j, mu): (usize, &f64)| relative_residual(kx.col(j), mx.col(j), *mu);
     let solution = &mut found.solution;
@@ -395,6 +397,20 @@ pub(super) fn constrain(
     found.fixed_interface =
         found.fixed_interface.take().map(|fixed| fixed.with_other_modes(coordinates.as_ref()));
     Ok(())
+}
+
+/// Deviation of the modal mass from the unit matrix above which the modes are normalised again. Bodies that deviate by
+/// 1e-9 are refused.
+const MAX_MASS_ROUNDING: f64 = 1e-11;
+
+/// Returns the eigenvalues, and the modes in terms of the shapes, of shapes with this `mass` and the stiffness
+/// diag(lambda): m = L L' and L^-1 diag(lambda)^(1/2) = U diag(mu)^(1/2) V' give X = L^-T U. Returns `None` if the mass is
+/// not positive definite.
+fn normalised(mass: Mat<f64>, lambda: &[f64]) -> Option<(Vec<f64>, Mat<f64>)> {
+    let lower = dense_cholesky(mass)?;
+    let root = Mat::from_fn(lambda.len(), lambda.len(), |i, j| if i == j { lambda[i].sqrt() } else { 0.0 });
+    let (roots, left) = left_singular_vectors(solve_lower(&lower, &root))?;
+    Some((roots.iter().map(|root| root * root).collect(), solve_upper(&lower, &left)))
 }
 
 /// Returns translation and rotation (6 x nf, in the plane 3 x nf) of the reference point of interface

@@ -323,6 +323,18 @@ impl FlexBody {
         self.parts.invariants.groups()
     }
 
+    /// Returns the part of the mass that turns with its nodes. Files of other programs do not state it.
+    fn turning(&self) -> Turning {
+        match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
+            (Some(_), Some(_)) => Turning::Partial,
+            (Some(_), None) => Turning::Whole,
+            (None, _) if self.parts.source.is_foreign() && self.parts.invariants.general().is_some() => {
+                Turning::Partial
+            }
+            (None, _) => Turning::None,
+        }
+    }
+
     /// Checks every identity that the file alone can fulfil (theory section 10), including those of the
     /// interface coordinates. `frame` is the intended body frame. The limits for a body with 32-bit arrays
     /// include their rounding.
@@ -335,11 +347,7 @@ impl FlexBody {
             eigenvalues: Some(&self.parts.modes.eigenvalue),
             eigenvalue_noise: self.parts.certificate.rigid_noise,
             eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
-            turning: match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
-                (None, _) => Turning::None,
-                (Some(_), Some(_)) => Turning::Partial,
-                (Some(_), None) => Turning::Whole,
-            },
+            turning: self.turning(),
         };
         let checks = identities(&self.parts.invariants, &expected);
         // Rounding moves the eigenvalues of the largest Gram matrix by at most the number of its rows times

@@ -31,8 +31,8 @@ const MAX_TRUNCATION: f64 = 0.01;
 /// warning.
 const MAX_RIGID_DEFORMATION: f64 = 1e-4;
 
-/// Motion of the interface, relative to the largest displacement of a mode, below which the motion is taken
-/// for rounding.
+/// Motion of the interface, relative to the largest displacement of a mode or its largest rotation times the extent of
+/// the body, below which the motion is taken for rounding.
 const ROUNDING_MOTION: f64 = 1e-12;
 
 impl FlexBody {
@@ -237,7 +237,8 @@ impl FlexBody {
     fn is_at_rest(&self, motion: &Mat<f64>) -> bool {
         let extent = self.extent();
         (0..self.n_modes()).all(|j| {
-            let size = ROUNDING_MOTION * self.largest_displacement(j);
+            let turn = self.modes().rotation.as_ref().map_or(0.0, |all| all.col(j).norm_max());
+            let size = ROUNDING_MOTION * self.largest_displacement(j).max(turn * extent);
             (0..3).all(|k| motion[(k, j)].abs() <= size && motion[(3 + k, j)].abs() * extent <= size)
         })
     }

@@ -21,13 +21,14 @@ impl FlexBody {
     ///
     /// # Errors
     /// [`CarrierImpossible`](Code::CarrierImpossible) for a body without all groups of the kinetic energy,
-    /// with geometric stiffness of forces or accelerations, or with rows that belong to no node: their
-    /// change is unknown without the FE model.
+    /// with geometric stiffness of forces or accelerations but not that of rotations, or with rows that belong to no
+    /// node: their change is unknown without the FE model.
     pub fn in_mean_axes(&self) -> Result<Cow<'_, Self>> {
         if self.conditions().is_mean() {
             return Ok(Cow::Borrowed(self));
         }
-        self.refuse_changed_frame("mean axes")?;
+        let knows_stiffness = !self.parts().rotated_stiffness.is_empty();
+        self.refuse_changed_frame("mean axes", knows_stiffness)?;
         let change = ModalChange::to_mean_axes(self.invariants(), self.dimension())
             .map_err(|reason| impossible(format!("the body has no mean axes: {reason}")))?;
         self.changed(&change, ReferenceConditions::MeanAxes).map(Cow::Owned)
@@ -64,7 +65,8 @@ impl FlexBody {
         if *self.conditions() == conditions {
             return Ok(self.clone());
         }
-        self.refuse_changed_frame(&format!("the frame on interface `{name}`"))?;
+        // The geometric stiffness of a carried body has that of the reaction, which a file does not have.
+        self.refuse_changed_frame(&format!("the frame on interface `{name}`"), false)?;
         let carried = self.carried(&Carrier::Interface(name.to_owned()))?;
         let change = ModalChange::in_present_frame(carried.invariants(), carried.dimension())
             .map_err(|reason| impossible(format!("no frame can stand on interface `{name}`: {reason}")))?;
@@ -91,7 +93,9 @@ impl FlexBody {
 
     /// Returns an error if the change of the reference conditions to `wanted` would leave a part of the
     /// body unknown.
-    fn refuse_changed_frame(&self, wanted: &str) -> Result<()> {
+    ///
+    /// * `knows_stiffness`: true if the change of the geometric stiffness of motion and loads is known.
+    fn refuse_changed_frame(&self, wanted: &str, knows_stiffness: bool) -> Result<()> {
         let conditions = self.conditions();
         let refuse = |what: &str, help: &str| {
             let message = format!("{conditions}: for {wanted} {what}");
@@ -105,11 +109,9 @@ impl FlexBody {
             );
         }
         let convert = "convert the FE model with the frame that is needed (--frame)";
-        if self
-            .geometric_stiffness()
-            .iter()
-            .any(|stiffness| !matches!(stiffness.load.kind, LoadKind::Named(_)))
-        {
+        let is_of_motion =
+            |stiffness: &GeometricStiffness<Mat<f64>>| !matches!(stiffness.load.kind, LoadKind::Named(_));
+        if !knows_stiffness && self.geometric_stiffness().iter().any(is_of_motion) {
             return refuse("the geometric stiffness of the rigid motion in the modes is not known", convert);
         }
         if self.modes().internal.is_some() {

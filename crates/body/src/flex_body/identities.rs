@@ -12,13 +12,14 @@ use std::collections::BTreeSet;
 /// Allowed difference of an energy computed in two ways.
 const MAX_ENERGY_DIFFERENCE: f64 = 1e-9;
 
-/// Rounding error of B'M B, relative to the sum of the magnitudes of its summands, which cancel in slender
-/// bodies with many modes. Measured: 1e-16 to 2.8e-16 of these sums, which reach 2.5e9 for a bar of five
-/// thousand times its width with 240 fixed-interface modes.
+/// Rounding error of an entry of B'M B, B'K B, R'M R or R'K R, relative to the sum of the magnitudes of its summands,
+/// which cancel in slender bodies with many modes and in bodies with many interfaces. Each entry of K, M and B is
+/// rounded, so that no smaller error can be expected. Measured: 1e-16 to 2.8e-16 of these sums, which reach 2.5e9 for a
+/// bar of five thousand times its width with 240 fixed-interface modes.
 const SUMMAND_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Allowed motion of the interface that carries the frame, relative to the largest displacement of the
-/// mode; rounding causes it.
+/// Allowed motion of the interface that carries the frame, relative to the largest motion of a node in the mode
+/// (its displacement, or its rotation times its distance from the reference point); rounding causes it.
 const MAX_MOTION_AT_REST: f64 = 1e-9;
 
 impl Parts {
@@ -36,9 +37,14 @@ impl Parts {
         let arm = if interface_extent > 0.0 { interface_extent } else { extent };
         // Rotations of a single node at rest are zeros, as for nodes without rotations.
         let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
+        // The reference point moves by the displacements of the nodes and their rotations times its distance from them,
+        // and both are rounded. A torsion of a straight beam displaces no node.
+        let distance = self.nodes.positions.iter().map(|x| Vector3::from(*x).norm()).fold(0.0, f64::max);
+        let turn = |j: usize| self.modes.rotation.as_ref().map_or(0.0, |all| all.col(j).norm_max());
+        let size = |j: usize| self.modes.shape.col(j).norm_max().max(distance * turn(j));
         let moved = |j: usize| {
             let turned = rows.rotation.as_ref().map_or(unknown, |rotation| arm * rotation.col(j).norm_max());
-            rows.translation.col(j).norm_max().max(turned) / self.modes.shape.col(j).norm_max()
+            rows.translation.col(j).norm_max().max(turned) / size(j)
         };
         let modes = (0..self.modes.shape.ncols()).map(moved);
         let displaced = reference.iter().map(|x| x.abs() / extent);
@@ -57,48 +63,43 @@ impl Parts {
         let InterfaceCoordinates { stiffness, mass, of_modes, .. } = coordinates;
         let twice = |a: &Mat<f64>, b: &Mat<f64>| gram(b.as_ref(), combine(a.as_ref(), b.as_ref()).as_ref());
         let (energy, inertia) = (twice(stiffness, of_modes), twice(mass, of_modes));
+        let sums = |a: &Mat<f64>, b: &Mat<f64>| twice(&magnitudes(a), &magnitudes(b));
         let root: Vec<f64> = self.modes.eigenvalue.iter().map(|l| l.sqrt()).collect();
         let nf = root.len();
-        let worst = |f: &dyn Fn(usize, usize) -> f64, rows: usize, columns: usize| {
-            let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-            largest(places.map(|(i, j)| f(i, j).abs()))
-        };
         let identity = |i: usize, j: usize| f64::from(i == j);
+        // The shapes contain the strain energy of rigid motion due to rounding of K, the modes do not.
+        let of_stiffness = MAX_ENERGY_DIFFERENCE
+            + 10.0 * self.certificate.rigid_noise
+            + self.certificate.eigenvalue_rounding;
+        let (of_energy, of_inertia) = (sums(stiffness, of_modes), sums(mass, of_modes));
         let mut checks = vec![
-            IdentityCheck::new(
-                "interface_stiffness",
-                "B' K B = diag(lambda)",
-                worst(&|i, j| energy[(i, j)] / (root[i] * root[j]) - identity(i, j), nf, nf),
-                // The shapes contain the strain energy of rigid motion due to rounding of K, the modes do
-                // not.
-                MAX_ENERGY_DIFFERENCE
-                    + 10.0 * self.certificate.rigid_noise
-                    + self.certificate.eigenvalue_rounding,
-            ),
-            interface_mass(&inertia, &twice(&magnitudes(mass), &magnitudes(of_modes))),
+            worst_entry("interface_stiffness", "B' K B = diag(lambda)", (nf, nf), of_stiffness, |i, j| {
+                let size = root[i] * root[j];
+                (energy[(i, j)] / size - identity(i, j), of_energy[(i, j)] / size)
+            }),
+            worst_entry("interface_mass", "B' M B = I", (nf, nf), MAX_ENERGY_DIFFERENCE, |i, j| {
+                (inertia[(i, j)] - identity(i, j), of_inertia[(i, j)])
+            }),
         ];
         if let Some(rigid) = self.rigid_coordinates() {
-            let (expected, found) = (self.rigid_mass(), twice(mass, &rigid));
-            let r = rigid.ncols();
-            checks.push(IdentityCheck::new(
+            let (expected, found, r) = (self.rigid_mass(), twice(mass, &rigid), rigid.ncols());
+            let size = |i: usize, j: usize| (expected[(i, i)] * expected[(j, j)]).sqrt();
+            let of_mass = sums(mass, &rigid);
+            let formula = "R' M R = [m, -c~; c~, I0]";
+            checks.push(worst_entry(
                 "interface_rigid_mass",
-                "R' M R = [m, -c~; c~, I0]",
-                worst(
-                    &|i, j| (found[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
-                    r,
-                    r,
-                ),
+                formula,
+                (r, r),
                 MAX_ENERGY_DIFFERENCE,
+                |i, j| ((found[(i, j)] - expected[(i, j)]) / size(i, j), of_mass[(i, j)] / size(i, j)),
             ));
             let (energy, first) = (twice(stiffness, &rigid), root.first().map_or(1.0, |root| root * root));
-            checks.push(IdentityCheck::new(
-                "interface_rigid_motion",
-                "R' K R = 0 beside lambda_1 R' M R",
-                worst(&|i, j| energy[(i, j)] / (first * (expected[(i, i)] * expected[(j, j)]).sqrt()), r, r),
-                MAX_ENERGY_DIFFERENCE
-                    + 10.0 * self.certificate.rigid_noise
-                    + self.certificate.eigenvalue_rounding,
-            ));
+            let of_energy = sums(stiffness, &rigid);
+            let formula = "R' K R = 0 beside lambda_1 R' M R";
+            checks.push(worst_entry("interface_rigid_motion", formula, (r, r), of_stiffness, |i, j| {
+                let size = first * size(i, j);
+                (energy[(i, j)] / size, of_energy[(i, j)] / size)
+            }));
         }
         checks
     }
@@ -152,30 +153,28 @@ impl Parts {
     }
 }
 
-fn magnitudes(a: &Mat<f64>) -> Mat<f64> {
+/// Returns the magnitudes of all entries.
+pub(crate) fn magnitudes(a: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)].abs())
 }
 
-/// Checks B'M B = I against the rounding error of its summands, whose magnitudes add up to `sums`. Returns
-/// the check of the worst entry.
-fn interface_mass(product: &Mat<f64>, sums: &Mat<f64>) -> IdentityCheck {
-    let n = product.nrows();
-    let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+/// Returns the check of the entry of a matrix that comes closest to its limit, or exceeds it most: `limit` and the rounding
+/// error of the summands of the entry.
+///
+/// * `entry`: returns the deviation of an entry from its identity, and the sum of the magnitudes of its summands.
+pub(crate) fn worst_entry(
+    name: &'static str,
+    formula: &'static str,
+    (rows, columns): (usize, usize),
+    limit: f64,
+    entry: impl Fn(usize, usize) -> (f64, f64),
+) -> IdentityCheck {
+    let entries = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
     let check = |(i, j): (usize, usize)| {
-        let value = (product[(i, j)] - f64::from(i == j)).abs();
-        IdentityCheck::new(
-            "interface_mass",
-            "B' M B = I",
-            value,
-            MAX_ENERGY_DIFFERENCE + SUMMAND_ROUNDING * sums[(i, j)],
-        )
+        let (deviation, sum) = entry(i, j);
+        IdentityCheck::new(name, formula, deviation.abs(), limit + SUMMAND_ROUNDING * sum)
     };
-    let worse = |a: IdentityCheck, b: IdentityCheck| {
-        let is_worse = b.value.is_nan() || b.value / b.limit > a.value / a.limit;
-        if is_worse { b } else { a }
-    };
-    let none = IdentityCheck::new("interface_mass", "B' M B = I", 0.0, MAX_ENERGY_DIFFERENCE);
-    entries.map(check).fold(none, worse)
+    entries.map(check).fold(IdentityCheck::new(name, formula, 0.0, limit), IdentityCheck::or_worse)
 }
 
 // Cross-checks between parts of a body that no theorem about a single part covers (theory section 10).

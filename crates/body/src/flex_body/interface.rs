@@ -2,8 +2,8 @@
 
 use super::modal_change::{NodesWithRotations, stacked};
 use faer::{Mat, MatRef};
-use flexbody_linalg::combine;
 use flexbody_linalg::ties::first_largest;
+use flexbody_linalg::{combine, larger};
 use flexbody_model::{Coupling, InterfaceMotion, Nodes};
 
 /// Named interface of the body.
@@ -52,6 +52,13 @@ impl InterfaceRows {
         let by_mode = self.misfit.iter().copied().enumerate();
         let (mode, misfit) = first_largest(by_mode, |pair| pair.1).unwrap_or((0, 0.0));
         (mode, if self.largest > 0.0 { misfit / self.largest } else { 0.0 })
+    }
+
+    /// Returns the largest deformation of the interface, relative to its largest motion in any mode or to `motion` if that is
+    /// larger.
+    pub(crate) fn deformation_beside(&self, motion: f64) -> f64 {
+        let misfit = self.misfit.iter().copied().fold(0.0, larger);
+        if misfit == 0.0 { 0.0 } else { misfit / self.largest.max(motion) }
     }
 }
 

@@ -37,6 +37,7 @@ pub use flexbody_model::{
 };
 pub use held_modes::HeldMode;
 pub use held_response::RigidAccelerations;
+pub(crate) use identities::{magnitudes, worst_entry};
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::{along, stiffness_about};

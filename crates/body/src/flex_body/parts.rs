@@ -25,6 +25,13 @@ pub struct Source {
     pub settings: serde_json::Value,
 }
 
+impl Source {
+    /// Returns true if the body was read from a file of another program, whose format is the setting `from`.
+    pub fn is_foreign(&self) -> bool {
+        self.settings["from"].is_string()
+    }
+}
+
 /// Structure of the FE mass matrix, as tested block by block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "kebab-case")]

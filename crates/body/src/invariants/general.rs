@@ -385,6 +385,14 @@ pub(super) fn plane_ibar(half_w1: f64, c2: f64) -> Matrix3<f64> {
     ibar
 }
 
+/// Returns the entries of W0 (3 x 3nf) that a plane body has, those of translations in the plane and of the rotation about
+/// z, and zeros elsewhere.
+pub(super) fn plane_w0(w0: &Mat<f64>) -> Mat<f64> {
+    let about_z = w0.ncols() / 3 * 2;
+    let exists = |k: usize, column: usize| k < 2 && column >= about_z;
+    Mat::from_fn(3, w0.ncols(), |k, column| if exists(k, column) { w0[(k, column)] } else { 0.0 })
+}
+
 /// Returns the isotropic tensor in the plane with J_xx + J_yy = `about_z`.
 fn lamina(about_z: f64) -> Matrix3<f64> {
     Matrix3::from_diagonal(&Vector3::new(0.5, 0.5, 0.0)) * about_z

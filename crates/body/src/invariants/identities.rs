@@ -1,7 +1,8 @@
 //! Identities that hold for every exact body (theory section 10), evaluated from the invariants.
 
 use super::comparison::scaled;
-use super::{BodyFrame, CauchySchwarz, Derived, Invariants, identity_terms as terms};
+use super::general::plane_w0;
+use super::{BodyFrame, CauchySchwarz, Derived, Invariants, MassKind, identity_terms as terms};
 use faer::Mat;
 use nalgebra::Vector3;
 
@@ -41,6 +42,12 @@ impl IdentityCheck {
     pub fn new(name: &'static str, formula: &'static str, value: f64, limit: f64) -> Self {
         Self { name, formula, value, limit, passed: value <= limit }
     }
+
+    /// Returns the check that comes closer to its limit, or exceeds it more.
+    pub(crate) fn or_worse(self, other: Self) -> Self {
+        let is_worse = other.value.is_nan() || other.value / other.limit > self.value / self.limit;
+        if is_worse { other } else { self }
+    }
 }
 
 /// Claims of a body, which decide the identities that apply.
@@ -74,7 +81,7 @@ pub enum Turning {
     /// format 1.6).
     #[default]
     None,
-    /// Points and directors, and a part of the mass that does not turn: W0 = -C1~.
+    /// Points and directors, and a part of the mass that does not turn, or may not: W0 = -C1~.
     Partial,
     /// Points and directors only: every formula of M = Ms kron I3 holds, except for signs of products,
     /// since the mass of directors may belong to no position.
@@ -133,18 +140,28 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -
     checks
 }
 
-/// Returns the identities of a mass of points and directors.
+/// Returns the identities of a mass of points and directors. Of a plane body only the rotation about z is known, and its
+/// S is that of a lamina: W0 has the translations in the plane and the rotation about z, and S12 does not give W3, which
+/// is skew since every block of the mass is a multiple of the unit matrix.
 fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
     let (check, nf, solid) = (IdentityCheck::new, body.n_modes(), body.as_solid());
-    let difference = terms::difference(&solid.w0(), &body.w0(), &|_, column| bound.c1(column % nf));
-    let mut checks = vec![check("w0_of_c1", "W0 = -C1~", difference, GRAM_LIMIT)];
+    let is_plane = matches!(body.kind(), MassKind::Plane(_));
+    let existing = |w0: Mat<f64>| if is_plane { plane_w0(&w0) } else { w0 };
+    let by_column = |_: usize, column: usize| bound.c1(column % nf);
+    let value = terms::difference(&existing(solid.w0()), &existing(body.w0()), &by_column);
+    let mut checks = vec![check("w0_of_c1", "W0 = -C1~", value, GRAM_LIMIT)];
     if turning == Turning::Partial {
         return checks;
     }
     let by_modes = |row: usize, column: usize| bound.s(row % nf, column % nf);
     if let (Some(w3), Some(of_s), true) = (body.w3(), solid.w3(), body.0.groups.w2) {
-        let value = terms::difference(&of_s, &w3, &by_modes);
-        checks.push(check("w3_of_s", "W3_k = S_lm - S_ml", value, GENERAL_MASS_LIMIT));
+        checks.push(if is_plane {
+            let value = terms::w3_symmetric_part(&w3, bound);
+            check("w3_skew", "every block of W3 skew", value, GENERAL_MASS_LIMIT)
+        } else {
+            let value = terms::difference(&of_s, &w3, &by_modes);
+            check("w3_of_s", "W3_k = S_lm - S_ml", value, GENERAL_MASS_LIMIT)
+        });
         let value = terms::difference(&solid.modal_mass(), &body.modal_mass(), &by_modes);
         checks.push(check("modal_mass_of_s", "m_ff = S11 + S22 + S33", value, GENERAL_MASS_LIMIT));
     }

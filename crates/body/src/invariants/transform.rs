@@ -2,7 +2,7 @@
 //! the modes, and restriction to fewer groups, modes or digits.
 
 use super::derived::CYCLIC;
-use super::general::{ibar_of, plane_ibar, symmetrise};
+use super::general::{ibar_of, plane_ibar, plane_w0, symmetrise};
 use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
@@ -53,10 +53,7 @@ impl Invariants {
     pub(crate) fn with_w0_of_c1(mut self) -> Self {
         let w0 = self.as_solid().w0();
         if let Some(general) = &mut self.0.general {
-            let nf = w0.ncols() / 3;
-            let exists = |k: usize, column: usize| !general.plane || (k < 2 && column >= 2 * nf);
-            general.w0 =
-                Mat::from_fn(3, 3 * nf, |k, column| if exists(k, column) { w0[(k, column)] } else { 0.0 });
+            general.w0 = if general.plane { plane_w0(&w0) } else { w0 };
         }
         self
     }
@@ -250,8 +247,9 @@ impl Invariants {
         };
         let ((old_w0, old_w3), (new_w0, new_w3)) = (solid(self), solid(&new));
         let modal_mass = change.transpose() * self.mass_matrix() * &change;
+        let w0 = new_w0 + (&general.w0 - old_w0);
         new.0.general = Some(GeneralTerms {
-            w0: new_w0 + (&general.w0 - old_w0),
+            w0: if general.plane { plane_w0(&w0) } else { w0 },
             w3: new_w3 + (&general.w3 - old_w3),
             modal_mass: Mat::from_fn(nf, nf, |i, j| 0.5 * (modal_mass[(i, j)] + modal_mass[(j, i)])),
             plane: general.plane,

@@ -4,6 +4,7 @@
 
 mod accepted;
 mod answered_shapes;
+mod beam_frames;
 mod beams;
 mod carried_groups;
 mod certified_invariants;
@@ -29,6 +30,7 @@ mod multigrid;
 mod nastran;
 mod nastran_rows;
 mod node_inertia;
+mod operator_rounding;
 mod partial_conversion;
 mod plans;
 mod precision;

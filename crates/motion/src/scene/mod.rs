@@ -50,7 +50,7 @@ pub use instants::{ExcitedRates, Instant, highest_excited_rate, instants, unsett
 pub use interface_stresses::stresses_at_rigid_interfaces;
 pub use load_cases::LoadCases;
 pub use prepared::{damped, damped_once, ends_a_run, fastest_history, find_nodal_point, nodal_point};
-pub use recovered::{AmplitudeHistory, LoadHistory, LoadedHistory, MEAN_AXES, RecoveredMotion};
+pub use recovered::{AmplitudeHistory, IN_MEAN_AXES, LoadHistory, LoadedHistory, MEAN_AXES, RecoveredMotion};
 pub use recovery_errors::{RecoveryMeasure, TracedRecoveries};
 pub use requests::{Recovered, RecoveryRequest, Simulated, SimulationRequest};
 pub use requirements::{

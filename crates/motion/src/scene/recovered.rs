@@ -29,9 +29,14 @@ const SPIN_RATE_COLUMNS: [&str; 3] =
 /// of the body's file is on an interface and the motion is in mean axes, in which the body has other modes.
 pub const MEAN_AXES: &str = "mean_axes_";
 
-/// Columns of a table of `simulate` that tell a body with a prescribed motion, and one in mean axes.
+/// Columns of a table of `simulate` that tell a body with a prescribed motion, and one in mean axes: that of their torque,
+/// or [`IN_MEAN_AXES`] for a body whose torque of mean axes is not known.
 const REACTION: &str = "reaction_force_x";
 const CONDITIONS: &str = "conditions_torque_x";
+
+/// Column of ones in the table of `simulate` of a body with a prescribed motion in mean axes, whose torque is not known:
+/// one without W3, or with nodes whose rotations carry mass.
+pub const IN_MEAN_AXES: &str = "mean_axes";
 
 /// Motion and loads of a body, computed by any program, at its own instants. Vectors are along the axes of the model,
 /// which turn with the body.
@@ -110,6 +115,11 @@ fn modal_columns(file: &InputFile, body: &FlexBody) -> (bool, impl Fn(&str) -> V
     let is_in_mean_axes = !body.conditions().is_mean() && has_column(file, &format!("{MEAN_AXES}q_1"));
     let (modes, count) = (if is_in_mean_axes { MEAN_AXES } else { "" }, body.n_modes());
     (is_in_mean_axes, move |prefix| (1..=count).map(|j| format!("{modes}{prefix}_{j}")).collect())
+}
+
+/// Returns true for the table of a prescribed motion that does not name mean axes.
+fn names_carrier(file: &InputFile) -> bool {
+    has_column(file, REACTION) && ![CONDITIONS, IN_MEAN_AXES].iter().any(|column| has_column(file, column))
 }
 
 impl LoadedHistory {
@@ -191,8 +201,7 @@ impl LoadedHistory {
             named,
             time: all.times,
             carrier: None,
-            // A body with a prescribed motion in mean axes has the torque of these too.
-            is_of_carried: has_column(&file, REACTION) && !has_column(&file, CONDITIONS),
+            is_of_carried: !is_in_mean_axes && names_carrier(&file),
             is_in_mean_axes,
         })
     }

@@ -226,6 +226,29 @@ fn the_reaction_is_one_of_the_loads_that_stress_a_carried_body() {
     }
 }
 
+/// The geometric stiffness of a body on its root that nothing carries is that of the nodes in its modes in mean axes.
+#[test]
+fn a_body_on_an_interface_keeps_its_geometric_stiffness_in_mean_axes() {
+    let bar = Bar::new();
+    let raw = bar.stressed();
+    let body = body_of(raw.clone(), on_root());
+    let free = body.in_mean_axes().expect("the stiffness of rotations is known");
+    let psi = shapes(&free);
+    assert!((psi.transpose() * &bar.m * bar.rigid()).amax() < 1e-9 * psi.amax() * bar.m.amax());
+    assert_eq!(free.geometric_stiffness().len(), raw.data.geometric_stiffness.len());
+    for given in &raw.data.geometric_stiffness {
+        let own = free.geometric_stiffness().iter().find(|own| own.load == given.load).expect("the load");
+        let expected = psi.transpose() * dense(&given.matrix.matrix) * &psi;
+        let error = (converted_matrix(&own.matrix) - &expected).amax() / expected.amax();
+        assert!(error < 1e-9, "{:?}: {error:e}", given.load);
+    }
+    let mut parts = body.into_parts();
+    parts.rotated_stiffness.clear();
+    let unknown = FlexBody::new(parts).expect("a body");
+    let refused = unknown.in_mean_axes().expect_err("the stiffness of rotations is not known");
+    assert!(refused.has(Code::CarrierImpossible), "{refused}");
+}
+
 /// Returns a basis of all displacements without motion of the root (3n x (3n - 6)).
 fn at_rest(bar: &Bar) -> DMatrix<f64> {
     let projector =

@@ -16,7 +16,7 @@ use flexbody_linalg::larger;
 use flexbody_linalg::ties::sort_descending;
 use flexbody_motion::dynamics::Balance;
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{Drift, Envelope, MEAN_AXES, Path, Recording, Scheme};
+use flexbody_motion::scene::{Drift, Envelope, IN_MEAN_AXES, MEAN_AXES, Path, Recording, Scheme};
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -505,6 +505,9 @@ fn csv_columns(recording: &Recording) -> Vec<String> {
     if conditions.is_some() {
         head.extend(xyz("conditions_torque"));
     }
+    if names_mean_axes(recording) {
+        head.push(IN_MEAN_AXES.to_owned());
+    }
     for path in paths {
         for what in ["place", "deflection", "velocity", "acceleration"] {
             head.extend(xyz(&format!("{} {what}", path.name)));
@@ -520,6 +523,12 @@ fn csv_columns(recording: &Recording) -> Vec<String> {
         head.extend((1..=nf).map(|j| format!("{modes}qdd_{j}")));
     }
     head
+}
+
+/// Returns true if a prescribed motion is in mean axes and no column of their torque tells so.
+fn names_mean_axes(recording: &Recording) -> bool {
+    let Recording { reactions, conditions, setting, .. } = recording;
+    reactions.is_some() && conditions.is_none() && setting.carrier.is_none()
 }
 
 /// Returns a recording as comma-separated values with one row per output time; numbers round-trip.
@@ -546,6 +555,9 @@ pub fn simulation_csv(recording: &Recording) -> String {
         }
         if let Some(torques) = conditions {
             row.extend(&torques[i]);
+        }
+        if names_mean_axes(recording) {
+            row.push(1.0);
         }
         for path in paths {
             for vectors in [&path.place, &path.deflection, &path.velocity, &path.acceleration] {
