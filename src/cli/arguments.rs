@@ -20,6 +20,7 @@ use flexbody_body::convert::StressLoads;
 use flexbody_body::flex_body::Storage;
 use flexbody_formats::FORMATS;
 use flexbody_formats::export::ExportFormat;
+use flexbody_model::Accepted;
 use flexbody_study::trade::ReferenceChoice;
 use headings::{COST, FORMAT, LOSSES, MODEL, MODES, OUTPUT, SCENE};
 use std::path::PathBuf;
@@ -600,6 +601,15 @@ fn stress_loads(text: &str) -> Result<StressLoads, String> {
 }
 
 /// Parses a positive number.
+/// Reads the codes of accepted checks, or `all`.
+fn accepted(text: &str) -> Result<Accepted, String> {
+    if text == "all" {
+        return Ok(Accepted::from(true));
+    }
+    let possible = || Accepted::possible().collect::<Vec<&str>>().join(", ");
+    Accepted::from_codes(text).map_err(|code| format!("`{code}` is none of {}", possible()))
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

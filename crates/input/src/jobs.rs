@@ -9,6 +9,7 @@ mod deck_mesh;
 mod deck_of_elements;
 mod deck_scope;
 mod deck_surfaces;
+mod dependent_rows;
 mod described;
 mod described_file;
 mod element_kinds;

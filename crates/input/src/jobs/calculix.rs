@@ -5,7 +5,8 @@ use super::couplings::Coupling;
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
-use super::described::{DescribedRows, Program, described_of_job, nothing};
+use super::dependent_rows::with_dependent_rows;
+use super::described::{DescribedRows, Program, constraints, described_of_job, nothing};
 use super::expanded::{Once, copies_in_sets, label_once};
 use super::job::{JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
@@ -15,7 +16,7 @@ use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, expected, integer, real};
-use flexbody_elements::DescribedElements;
+use flexbody_elements::{DescribedElements, Equation};
 use flexbody_model::{DofLabel, GivenRows, Nodes, RawMatrix};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -80,6 +81,7 @@ impl JobReader for Calculix {
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
         let is_expanded = has_copies || !knots.are_absent();
+        let equations = if is_expanded { Vec::new() } else { equations_of(&deck, &mesh, &dofs, &rotations) };
         let described =
             if describe { Some(described_job(&deck, &mesh, &dofs, &rotations, is_expanded)) } else { None };
         let elements = mesh.drawn_by_corners();
@@ -89,7 +91,7 @@ impl JobReader for Calculix {
         diagnostics.extend(placed_note(&means, &dofs, path));
         let mut files = deck.seen()?;
         files.extend([("stiffness", stiffness_file), ("mass", mass_file), ("dofs", dofs_file)]);
-        Ok(JobModel {
+        let job = JobModel {
             stiffness,
             mass,
             nodes: Nodes { ids, positions },
@@ -101,7 +103,8 @@ impl JobReader for Calculix {
             diagnostics,
             followers: None,
             described,
-        })
+        };
+        Ok(with_dependent_rows(job, &equations))
     }
 }
 
@@ -119,6 +122,17 @@ fn described_job(
     }
     let rows = DescribedRows::new(Program::Calculix, labels, rotations);
     described_of_job(deck, mesh, &rows)
+}
+
+/// Returns the equations of directions without rows; none if a card of the deck cannot be read.
+fn equations_of(
+    deck: &Deck,
+    mesh: &DeckMesh,
+    labels: &[DofLabel],
+    rotations: &HashMap<i64, i64>,
+) -> Vec<Equation> {
+    let rows = DescribedRows::new(Program::Calculix, labels, rotations);
+    constraints(deck, mesh, &rows).map_or_else(|_| Vec::new(), |(equations, _)| equations)
 }
 
 /// Reads a stiffness matrix (`.sti`) and the labels of its rows (`.dof`).

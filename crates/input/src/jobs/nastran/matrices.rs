@@ -114,26 +114,26 @@ impl Matrices {
         })
     }
 
-    /// Returns the equations of the rows that follow others, along the axes of the model, and those that are not described:
-    /// a grid with axes of its own whose displacements, or rotations, do not all follow others.
-    pub(super) fn equations(&self, places: &GridPlaces<'_>) -> (Vec<Equation>, Vec<NotDescribed>) {
-        let Some((elimination, _)) = &self.followers else { return (Vec::new(), Vec::new()) };
-        let left: HashSet<Point> = elimination.points.iter().copied().collect();
+    /// Returns the equations of the components that follow others, along the axes of the model, and those that are not
+    /// described: a grid with axes of its own whose displacements, or rotations, do not all follow others. If the matrices
+    /// of the files contain the constraints already, they are those of the deck.
+    pub(super) fn equations(
+        &self,
+        bulk: &Bulk,
+        places: &GridPlaces<'_>,
+    ) -> (Vec<Equation>, Vec<NotDescribed>) {
+        let has: HashSet<Point> = self.labels.iter().map(|label| (label.node, label.direction)).collect();
+        let all = || Followers::new(&bulk.constraints.supported(), places).ok();
+        let open = followers(bulk, |point| has.contains(point), places).ok().flatten();
+        let Some(followers) = open.or_else(all) else { return Default::default() };
+        // Each term along the axes of the model.
         let mut sums: BTreeMap<Point, BTreeMap<Point, f64>> = BTreeMap::new();
-        for (column, label) in self.labels.iter().enumerate() {
-            let point = (label.node, label.direction);
-            if left.contains(&point) {
-                continue;
-            }
-            // Each term along the axes of the model.
-            let mut sum: BTreeMap<Point, f64> = BTreeMap::new();
-            let (rows, factors) = elimination.follows.column(column);
-            for (row, factor) in rows.iter().zip(factors) {
-                let leader = elimination.points[*row as usize];
+        for (point, terms) in followers.sums() {
+            let sum = sums.entry(*point).or_default();
+            for &(leader, factor) in terms {
                 along_model(leader, places)
                     .for_each(|(term, part)| *sum.entry(term).or_default() += part * factor);
             }
-            sums.insert(point, sum);
         }
         let (mut equations, mut open) = (Vec::new(), BTreeSet::new());
         for &(grid, component) in sums.keys() {
