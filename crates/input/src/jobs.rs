@@ -19,6 +19,7 @@ mod knots;
 mod matrix_files;
 mod nastran;
 mod siblings;
+mod transformed;
 
 use super::node_file::NodeFile;
 use abaqus::Abaqus;

@@ -108,6 +108,10 @@ codes! {
         "The deck ties degrees of freedom together (multi-point constraints, rigid elements), so the dependent rows are combined with the independent ones.";
     InputChanged = "FB132", Error, BadInput, "file changed while it was read", "run again after the program that writes the file has finished",
         "Size, time or content of the file was different at the end of the reading: another program writes it.";
+    DeckDamping = "FB133", Warning, Done, "dashpots of the deck are not in the body", "state the damping of the modes (--damping, [damping] of a manifest: also as a matrix), or give the dashpots to the multibody program as force elements at interfaces",
+        "Dashpots are in neither of the matrices K and M, and the body has only the damping that is stated.";
+    DeckStressed = "FB134", Warning, Done, "stiffness of the deck contains the stress of an earlier step", "write K in a first step without PERTURBATION, and give the stress stiffness as [[geometric_stiffness]]",
+        "A step with PERTURBATION after another one writes the stiffness under the loads of that step. It resists rotations (FB410), and acts whatever the loads of the body are.";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/reference/input.md for the keys",
         "The text is not TOML, a key is misspelled or missing, or a value has another type than its key.";

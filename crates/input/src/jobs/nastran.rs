@@ -11,7 +11,7 @@ mod matrices;
 mod systems;
 
 use super::dependent_rows::with_dependent_rows;
-use super::job::{JobFile, JobModel, JobReader, condensed};
+use super::job::{JobFile, JobModel, JobReader, condensed, damping_left_out};
 use crate::bulk_cards::is_bulk_data;
 use crate::node_file::NodeFile;
 use bulk::Bulk;
@@ -183,6 +183,7 @@ fn deck_notes(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
         let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";
         diagnostics.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
     }
+    diagnostics.extend(damping_left_out(bulk.n_dampers, "damping elements (CDAMP, CVISC)", path));
     if let Some((path, line, count)) = &bulk.supports {
         let message = match count {
             1 => "a card supports the body".to_owned(),

@@ -82,6 +82,11 @@ impl StressMatrix {
             let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(&raw.path);
             return Err(vec![diagnostic.with_help("give the geometric stiffness itself, without load_size")]);
         }
+        if labels.as_ref().is_some_and(|labels| rows.counts().any(|count| count == labels.len())) {
+            let message = "rows of K are along axes of nodes (GLOBAL=NO), and it is not known along which axes those of the matrix with stress are";
+            let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(&raw.path);
+            return Err(vec![diagnostic.with_help("write both matrices without GLOBAL=NO")]);
+        }
         let matrix = match &labels {
             Some(labels) => in_rows_of(raw, labels, &plain.labels)?,
             None => by_rows_of_model(raw, rows)?,

@@ -74,7 +74,7 @@ fn report_strained(strained: &Strained<'_>, ground: Option<Diagnostic>, diagnost
             Some([first, second]) => format!(
                 "exchange the coordinates of nodes {first} and {second}: with these exchanged, K leaves rigid motion free"
             ),
-            None if origin.allow_implausible.accepts(Code::RigidMotionStrained) => {
+            None if strained.may_be_accepted() && origin.allow_implausible.accepts(Code::RigidMotionStrained) => {
                 let message = format!("{}; accepted", strained.message());
                 diagnostics.push(Diagnostic::new(Code::NodesRounded, message).in_file(&origin.stiffness.path).with_help(
                     "nothing to do if the frequencies of the rigid body lie far below that of the first mode, which is checked with the modes",
@@ -91,10 +91,16 @@ fn report_strained(strained: &Strained<'_>, ground: Option<Diagnostic>, diagnost
 /// Returns advice for a stiffness that only rotations strain.
 fn rotations_alone(strained: &Strained<'_>, are_few: bool) -> String {
     let at = if are_few { "of these nodes" } else { "of all nodes" };
-    let accept = acceptance(Code::RigidMotionStrained);
+    let check = format!(
+        "check unit, order and digits of the coordinates {at}, and the labels of rotations: translations, which need no coordinates, do not strain K, so that nothing supports it"
+    );
+    if !strained.may_be_accepted() {
+        return check;
+    }
     format!(
-        "check unit, order and digits of the coordinates {at}, and the labels of rotations: translations, which need no coordinates, do not strain K, so that nothing supports it; if the elements of K do not follow rotations exactly (warped shells, offsets), compare {} of the rigid body with the first mode, and use {accept}",
-        strained.highest_frequency().map_or("the frequencies".to_owned(), |hertz| format!("{hertz} Hz"))
+        "{check}; if the elements of K do not follow rotations exactly (warped shells, offsets), compare {} of the rigid body with the first mode, and use {}",
+        strained.highest_frequency().map_or("the frequencies".to_owned(), |hertz| format!("{hertz} Hz")),
+        acceptance(Code::RigidMotionStrained)
     )
 }
 

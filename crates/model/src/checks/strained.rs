@@ -12,6 +12,13 @@ use nalgebra::DMatrix;
 /// Number of nodes with the largest forces among which exchanged coordinates are searched: each pair of them is tested.
 const MAX_EXCHANGED: usize = 8;
 
+/// Largest residual that a user may accept: elements that do not follow rotations exactly leave 1e-6 to 1e-4, while
+/// coordinates in another order or unit leave 0.01 and more.
+const MAX_ACCEPTED: f64 = 1e-3;
+
+/// Part of the largest residual that the exchange of two nodes must leave: other errors of coordinates may remain.
+const EXCHANGED_PART: f64 = 1e-3;
+
 /// Rows that rigid motion strains beyond a limit.
 pub(crate) struct Strained<'b> {
     pub body: &'b Assembled,
@@ -53,13 +60,23 @@ impl<'b> Strained<'b> {
             "K R is not zero for {} of {} rows{motions}: |K R| reaches {:.1e} of the row sum of |K| (allowed {:.0e}); worst: {}",
             self.rows.len(),
             self.residuals.len(),
-            largest(self.residuals.iter().copied()),
+            self.worst(),
             self.limit,
             name_some(&named)
         )
     }
 
-    /// Returns the numbers of two nodes whose coordinates are exchanged: with these exchanged, no row is strained.
+    /// Returns true if rotations alone strain K so little that the user may accept it.
+    pub(crate) fn may_be_accepted(&self) -> bool {
+        !self.by_translations && self.worst() <= MAX_ACCEPTED
+    }
+
+    fn worst(&self) -> f64 {
+        largest(self.residuals.iter().copied())
+    }
+
+    /// Returns the numbers of two nodes whose coordinates are exchanged: with these exchanged, rows are strained by nothing
+    /// or by much less.
     pub(crate) fn exchanged(&self) -> Option<[i64; 2]> {
         let Assembled { nodes, rows, .. } = self.body;
         let mut worst: Vec<usize> = Vec::new();
@@ -68,13 +85,14 @@ impl<'b> Strained<'b> {
                 worst.push(vertex);
             }
         }
+        let left = self.limit.max(EXCHANGED_PART * self.worst());
         let mut positions = nodes.positions.clone();
         let (centre, length) = centre_and_length(&positions);
         let pairs = (0..worst.len()).flat_map(|second| (0..second).map(move |first| [first, second]));
         for [a, b] in pairs.map(|pair| pair.map(|at| worst[at])) {
             positions.swap(a, b);
             let fields = rows.rigid_fields(&positions, centre, length);
-            if Self::residuals_of(self.body, &fields).iter().all(|residual| *residual <= self.limit) {
+            if Self::residuals_of(self.body, &fields).iter().all(|residual| *residual <= left) {
                 let mut pair = [nodes.ids[a], nodes.ids[b]];
                 pair.sort_unstable();
                 return Some(pair);

@@ -588,8 +588,14 @@ fn points_of_rows(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<Vec<
             return Ok(displacements);
         }
     }
+    let counted_rows: Vec<usize> = counted.iter().map(|(_, rows)| *rows).collect();
     let counted: Vec<String> = counted.into_iter().map(|(what, rows)| format!("{what} {rows}")).collect();
     let message = format!("matrix {name} has {n} rows, the deck gives other numbers: {}", counted.join(", "));
-    let help = "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name";
+    let is_reduced = counted_rows.iter().any(|count| n < *count) && !name.contains("GG");
+    let help = if is_reduced {
+        "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name; if AUTOSPC has removed rows without stiffness (rotations of solids, normals of shells), write PARAM,AUTOSPC,NO"
+    } else {
+        "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name"
+    };
     Err(Diagnostic::new(Code::DeckRows, message).in_file(path).with_help(help))
 }
