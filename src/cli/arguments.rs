@@ -318,7 +318,8 @@ pub struct JobArguments {
     /// FE program that has written the job [default: detected from its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs(), help_heading = MODEL)]
     pub format: Option<String>,
-    /// Names of the stiffness and the mass matrix of the job, if it has several pairs (Nastran)
+    /// Names of the stiffness and the mass matrix of the job, if it has several pairs (Nastran), or of their files beside
+    /// the deck (Abaqus)
     #[arg(long, value_name = "K,M", help_heading = MODEL)]
     pub matrices: Option<String>,
     /// Units of length, mass and time if no manifest states them [default: m,kg,s; refused if the density is

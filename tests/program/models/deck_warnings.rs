@@ -57,6 +57,22 @@ fn a_stiffness_with_the_stress_of_an_earlier_step_gets_a_warning() {
     }
 }
 
+/// CalculiX continues after some errors; what it printed is read where it was kept.
+#[test]
+fn errors_that_calculix_reported_are_not_passed_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["job.inp", "job.sti", "job.mas", "job.dof"] {
+        let from = fixtures().join("small/calculix_distributing").join(name);
+        fs::copy(from, folder.path().join(name)).expect("copied");
+    }
+    let log = folder.path().join("job.log");
+    fs::write(&log, " *WARNING in allocation: none\n Job finished\n").expect("written");
+    assert!(!has(&codes(&folder.path().join("job.inp")), Code::DeckSyntax, ""));
+    fs::write(&log, " *INFO\n *ERROR in mastruct: mass of node 900 is left out\n").expect("written");
+    let told = codes(&folder.path().join("job.inp"));
+    assert!(has(&told, Code::DeckSyntax, "*ERROR in mastruct: mass of node 900"), "{told:?}");
+}
+
 #[test]
 fn axisymmetric_elements_and_beams_of_calculix_are_refused_by_their_types() {
     for (kind, nodes, part) in [

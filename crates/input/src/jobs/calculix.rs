@@ -12,7 +12,7 @@ use super::expanded::{Once, copies_in_sets, label_once};
 use super::job::{JobFile, JobModel, JobReader, both, damping_left_out, missing, refused_elements};
 use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
-use super::siblings::is_deck;
+use super::siblings::{is_deck, siblings};
 use super::transformed::along_model;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::numbers::significant;
@@ -56,6 +56,7 @@ impl JobReader for Calculix {
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::read(&deck, describe)?;
         refuse_kinds(&mesh, path)?;
+        refuse_reported_errors(path)?;
         let (labels, dofs_file) = read_labels(&dof)?;
         let rotations = rotation_nodes(&deck, &mesh, &labels)?;
         let means = reference_places(&deck, &mesh)?;
@@ -155,6 +156,27 @@ fn refuse_kinds(mesh: &DeckMesh, deck: &Path) -> Diagnosed<()> {
         diagnostic
             .with_help("use solid elements, or write the beams with a program that keeps their rotations"),
     ])
+}
+
+/// Returns FB110 if what CalculiX printed was kept beside the deck (`job.log`, `job.out`) and reports an error: CalculiX
+/// continues after some errors, and leaves out what they are about.
+fn refuse_reported_errors(deck: &Path) -> Diagnosed<()> {
+    let logs = siblings(deck).filter(|(rest, _)| rest == ".log" || rest == ".out");
+    for (_, log) in logs {
+        // A log that cannot be read says nothing.
+        let Ok(file) = InputFile::open(&log) else { continue };
+        let reported = Lines::of(file.bytes())
+            .filter_map(Line::content)
+            .find(|line| line.text.trim_ascii_start().starts_with(b"*ERROR"));
+        if let Some(line) = reported {
+            let message = format!("CalculiX reported an error: `{}`", excerpt(line.text));
+            let diagnostic = Diagnostic::new(Code::DeckSyntax, message).in_file(&log).at_line(line.number);
+            return Err(vec![diagnostic.with_help(
+                "correct the deck and run it again: the matrices may lack what the error is about; remove the file if it is of another run",
+            )]);
+        }
+    }
+    Ok(())
 }
 
 /// Returns the warning that the step with the matrices continues from an earlier one with its stress, if it does.
