@@ -25,7 +25,7 @@ fn told(job: &str, deck: &str, old: &str, new: &str) -> Vec<(Code, String)> {
 fn codes(path: &Path) -> Vec<(Code, String)> {
     let files = ModelFiles::from_job(path, None, Vec::new(), Some("m,kg,s")).expect("files");
     let found = read_model(&files).map_or_else(|error| error.into_diagnostics(), |raw| raw.diagnostics);
-    found.into_iter().map(|found| (found.code(), found.message().to_owned())).collect()
+    found.into_iter().map(|own| (own.code(), own.message().to_owned())).collect()
 }
 
 fn has(told: &[(Code, String)], code: Code, part: &str) -> bool {

@@ -65,7 +65,8 @@ impl JobReader for Calculix {
         // The files are read one after the other: each uses all threads, and the entries of only one are in memory.
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
-        let ([stiffness, mass], turned) = along_model([stiffness, mass], &labels, &deck, &mesh, &dof)?;
+        let ([stiffness, mass], turned) =
+            along_model([stiffness, mass], &labels, &rotations, &deck, &mesh, &dof)?;
         let is_turned = turned.counts().next().is_some();
         let knots = Knots::of(&mesh, &labels, &rotations, &dof)?;
         let ([stiffness, mass], given_rows) = if knots.are_absent() {

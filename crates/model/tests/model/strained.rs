@@ -47,7 +47,7 @@ fn finding(mut raw: RawModel, accepted: Accepted) -> Diagnostic {
     let found =
         FeModel::from_raw(raw).map_or_else(|error| error.into_diagnostics(), |checked| checked.diagnostics);
     let is_about =
-        |found: &Diagnostic| matches!(found.code(), Code::RigidMotionStrained | Code::NodesRounded);
+        |own: &Diagnostic| matches!(own.code(), Code::RigidMotionStrained | Code::NodesRounded);
     found.into_iter().find(is_about).expect("a finding")
 }
 
