@@ -13,7 +13,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Numbers of the grids of the two chains: 11 is fixed to 4.
+/// Numbers of the grids of the two chains, which make a ring: 14 is rigidly fixed to 1, and some components of 11 to 4.
 const GRIDS: [[i64; 4]; 2] = [[1, 2, 3, 4], [11, 12, 13, 14]];
 
 /// Row of a component of a grid in the g-set.
@@ -100,16 +100,19 @@ impl Chains {
     }
 }
 
-/// Returns the dependent rows of grid 11 for these components, by a rigid arm from grid 4.
-fn rigid(components: &[usize], arm: [f64; 3]) -> Vec<(usize, Vec<(usize, f64)>)> {
+/// Card that closes the ring.
+const CLOSED: &str = "RBE2,51,1,123456,14\n";
+
+/// Returns the dependent rows of a grid for these components, by a rigid arm from another grid.
+fn rigid([from, to]: [i64; 2], components: &[usize], arm: [f64; 3]) -> Vec<(usize, Vec<(usize, f64)>)> {
     let follow = |&component: &usize| {
-        let mut sum = vec![(row(4, component), 1.0)];
+        let mut sum = vec![(row(from, component), 1.0)];
         if component <= 3 {
             // Component k of theta x r.
             let (k, l) = (component % 3 + 1, (component + 1) % 3 + 1);
-            sum.extend([(row(4, 3 + k), arm[l - 1]), (row(4, 3 + l), -arm[k - 1])]);
+            sum.extend([(row(from, 3 + k), arm[l - 1]), (row(from, 3 + l), -arm[k - 1])]);
         }
-        (row(11, component), sum)
+        (row(to, component), sum)
     };
     components.iter().map(follow).collect()
 }
@@ -134,13 +137,16 @@ fn released_components_of_grids_leave_a_model_with_the_modes_of_the_constrained_
         ("slider", at_place, "", "RBE2,50,4,13456,11\n", &[1, 3, 4, 5, 6]),
     ] {
         let chains = Chains::new(gap);
-        let dependent = rigid(components, gap);
-        let reduced = chains.reduced(&dependent);
+        let dependent = rigid([4, 11], components, gap);
+        let across = [0, 1, 2].map(|k| chains.places[7][k] - chains.places[0][k]);
+        let closing = rigid([1, 14], &[1, 2, 3, 4, 5, 6], across);
+        let reduced = chains.reduced(&[dependent.clone(), closing].concat());
+        let cards = format!("{cards}{CLOSED}");
         let expected = modes_of(&reduced[0], &reduced[1]).eigenvalues;
         let before = [&chains.stiffness, &chains.mass];
         for (matrices, set) in [(before, "GG"), ([&reduced[0], &reduced[1]], "AA")] {
             let folder = tempfile::tempdir().expect("a folder");
-            let path = chains.write(folder.path(), [control, cards], matrices, set);
+            let path = chains.write(folder.path(), [control, &cards], matrices, set);
             let body = body(read(&path), 8);
             let modes = body.modes();
             let own = &modes.eigenvalue;
@@ -171,7 +177,7 @@ fn an_interface_at_a_pinned_grid_names_the_grid_that_it_follows() {
     let chains = Chains::new([0.0; 3]);
     let folder = tempfile::tempdir().expect("a folder");
     let matrices = [&chains.stiffness, &chains.mass];
-    let path = chains.write(folder.path(), ["", "RBE2,50,4,123,11\n"], matrices, "GG");
+    let path = chains.write(folder.path(), ["", &format!("RBE2,50,4,123,11\n{CLOSED}")], matrices, "GG");
     let words = |node: &'static str| {
         ["convert", "job.bdf", "--units", "m,kg,s", "--modes", "4", "-o", "b.h5", "--interface", node]
     };

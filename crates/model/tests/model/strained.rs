@@ -46,8 +46,7 @@ fn finding(mut raw: RawModel, accepted: Accepted) -> Diagnostic {
     raw.allow_implausible = accepted;
     let found =
         FeModel::from_raw(raw).map_or_else(|error| error.into_diagnostics(), |checked| checked.diagnostics);
-    let is_about =
-        |own: &Diagnostic| matches!(own.code(), Code::RigidMotionStrained | Code::NodesRounded);
+    let is_about = |own: &Diagnostic| matches!(own.code(), Code::RigidMotionStrained | Code::NodesRounded);
     found.into_iter().find(is_about).expect("a finding")
 }
 
