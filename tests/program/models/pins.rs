@@ -190,6 +190,6 @@ fn an_interface_at_a_pinned_grid_names_the_grid_that_it_follows() {
     );
     assert!(flexbody(folder.path(), &words("a=nodes:4,rigid")).status.success());
     let checked = FeModel::from_raw(read(&path)).expect("a model");
-    let about = checked.diagnostics.iter().filter(|note| note.code() == Code::DeckConstrained);
-    assert!(about.last().expect("a note").message().contains("nodes 11"));
+    let mut notes = checked.diagnostics.iter().filter(|note| note.code() == Code::DeckConstrained);
+    assert!(notes.any(|note| note.message().contains("nodes 11")));
 }

@@ -53,10 +53,10 @@ impl JobReader for Calculix {
         if !absent.is_empty() {
             return Err(absent);
         }
+        refuse_reported_errors(path)?;
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::read(&deck, describe)?;
         refuse_kinds(&mesh, path)?;
-        refuse_reported_errors(path)?;
         let (labels, dofs_file) = read_labels(&dof)?;
         let rotations = rotation_nodes(&deck, &mesh, &labels)?;
         let means = reference_places(&deck, &mesh)?;
@@ -72,9 +72,7 @@ impl JobReader for Calculix {
         let ([stiffness, mass], given_rows) = if knots.are_absent() {
             ([stiffness, mass], turned)
         } else if is_turned {
-            let message = "GLOBAL=NO: rows of knots of shells are along the axes of a *TRANSFORM";
-            let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(path);
-            return Err(vec![diagnostic.with_help("write the matrices without GLOBAL=NO")]);
+            return Err(turned_knots(path));
         } else {
             knots.condensed([stiffness, mass], &dof)?
         };
@@ -95,14 +93,13 @@ impl JobReader for Calculix {
         let equations = if is_expanded { Vec::new() } else { equations_of(&deck, &mesh, &dofs, &rotations) };
         let described =
             if describe { Some(described_job(&deck, &mesh, &dofs, &rotations, is_expanded)) } else { None };
-        let dashpots = dashpots_left_out(&mesh, path);
+        let warnings = [dashpots_left_out(&mesh, path), stressed(&deck, path)];
         let elements = mesh.drawn_by_corners();
         let sets = mesh.sets.with_copies(copies_in_sets(copies, &nodes, &dofs));
         let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
-        diagnostics.extend(dashpots);
-        diagnostics.extend(stressed(&deck, path));
+        diagnostics.extend(warnings.into_iter().flatten());
 
         let mut files = deck.seen()?;
         files.extend([("stiffness", stiffness_file), ("mass", mass_file), ("dofs", dofs_file)]);
@@ -178,6 +175,13 @@ fn refuse_reported_errors(deck: &Path) -> Diagnosed<()> {
         }
     }
     Ok(())
+}
+
+/// Returns FB111 for knots of shells among matrices along the axes of nodes.
+fn turned_knots(deck: &Path) -> Vec<Diagnostic> {
+    let message = "GLOBAL=NO: rows of knots of shells are along the axes of a *TRANSFORM";
+    let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
+    vec![diagnostic.with_help("write the matrices without GLOBAL=NO")]
 }
 
 /// Returns the warning that the step with the matrices continues from an earlier one with its stress, if it does.
