@@ -66,6 +66,15 @@ fn coupling(name: Argument<'_, '_>) -> PyResult<Option<Coupling>> {
     name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
 }
 
+/// Checks whose findings are accepted, from `flexbody.model`.
+#[derive(FromPyObject)]
+pub enum AcceptedChecks {
+    /// FB433, FB437 and FB460, or none.
+    All(bool),
+    /// Codes of the checks.
+    Codes(Vec<String>),
+}
+
 /// Damping from `flexbody.model`.
 #[derive(FromPyObject)]
 pub enum Damping<'py> {
@@ -215,7 +224,7 @@ impl Model {
             units: "tuple[str, str, str] | None",
             damping: "float | tuple[float, float] | list[tuple[float, float]] | _Compressed | None",
             residual_vectors: "tuple[bool, bool]",
-            allow_implausible,
+            allow_implausible: "bool | list[str]",
             keep_soft_rotations,
         )
     )]
@@ -233,7 +242,7 @@ impl Model {
         units: Option<[String; 3]>,
         damping: Option<Damping<'py>>,
         residual_vectors: (bool, bool),
-        allow_implausible: bool,
+        allow_implausible: AcceptedChecks,
         keep_soft_rotations: bool,
     ) -> PyResult<Self> {
         let (stiffness, mass) = (stiffness.matrix(py)?, mass.matrix(py)?);
@@ -267,9 +276,12 @@ impl Model {
         if let Some(damping) = &damping {
             builder = damped(py, builder, damping)?;
         }
-        if allow_implausible {
-            builder = builder.allow_implausible();
-        }
+        builder = match allow_implausible {
+            AcceptedChecks::All(false) => builder,
+            AcceptedChecks::All(true) => builder.allow_implausible(),
+            AcceptedChecks::Codes(codes) if codes.is_empty() => builder,
+            AcceptedChecks::Codes(codes) => value(py, builder.accept(&codes.join(",")))?,
+        };
         if keep_soft_rotations {
             builder = builder.keep_soft_rotations();
         }

@@ -11,8 +11,8 @@ use flexbody_input::{
 };
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
-    CheckedModel, Coupling, Damping, DampingBand, DofLabel, FeModel, NodalStress, NodeSet, Nodes, RawMatrix,
-    RawModel, Reference, StressNodes, SurfaceMesh,
+    Accepted, CheckedModel, Coupling, Damping, DampingBand, DofLabel, FeModel, NodalStress, NodeSet, Nodes,
+    RawMatrix, RawModel, Reference, StressNodes, SurfaceMesh,
 };
 use std::path::{Path, PathBuf};
 
@@ -357,10 +357,26 @@ impl ModelBuilder {
         self
     }
 
-    /// Treats implausible densities, and mass coupling between nodes without stiffness, as warnings instead of errors.
+    /// Treats implausible densities, mass coupling between nodes without stiffness, and stresses of recoveries that
+    /// contradict the stiffness, as warnings instead of errors.
     pub fn allow_implausible(mut self) -> Self {
-        self.raw.allow_implausible = true;
+        self.raw.allow_implausible = self.raw.allow_implausible.and(true.into());
         self
+    }
+
+    /// Treats the findings of single checks as warnings instead of errors: codes of the errors FB410 (rotations strain
+    /// the stiffness), FB433 (mass without stiffness), FB437 (density) or FB460 (stresses), separated by commas.
+    ///
+    /// # Errors
+    /// FB801 for another code.
+    pub fn accept(mut self, codes: &str) -> Result<Self> {
+        let accepted = Accepted::from_codes(codes).map_err(|code| {
+            let message = format!("findings of the check `{code}` cannot be accepted");
+            let possible: Vec<&str> = Accepted::possible().collect();
+            Diagnostic::new(Code::Usage, message).with_help(format!("use one of {}", possible.join(", ")))
+        })?;
+        self.raw.allow_implausible = self.raw.allow_implausible.and(accepted);
+        Ok(self)
     }
 
     /// Leaves rotations that only elements that are not quite coplanar hold as K has them, as shells without

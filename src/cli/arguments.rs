@@ -20,6 +20,7 @@ use flexbody_body::convert::StressLoads;
 use flexbody_body::flex_body::Storage;
 use flexbody_formats::FORMATS;
 use flexbody_formats::export::ExportFormat;
+use flexbody_model::Accepted;
 use flexbody_study::trade::ReferenceChoice;
 use headings::{COST, FORMAT, LOSSES, MODEL, MODES, OUTPUT, SCENE};
 use std::path::PathBuf;
@@ -328,7 +329,8 @@ pub struct JobArguments {
     /// FE program that has written the job [default: detected from its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs(), help_heading = MODEL)]
     pub format: Option<String>,
-    /// Names of the stiffness and the mass matrix of the job, if it has several pairs (Nastran)
+    /// Names of the stiffness and the mass matrix of the job, if it has several pairs (Nastran), or of their files beside
+    /// the deck (Abaqus)
     #[arg(long, value_name = "K,M", help_heading = MODEL)]
     pub matrices: Option<String>,
     /// Units of length, mass and time if no manifest states them [default: m,kg,s; refused if the density is
@@ -611,6 +613,15 @@ fn stress_loads(text: &str) -> Result<StressLoads, String> {
 }
 
 /// Parses a positive number.
+/// Reads the codes of accepted checks, or `all`.
+fn accepted(text: &str) -> Result<Accepted, String> {
+    if text == "all" {
+        return Ok(Accepted::from(true));
+    }
+    let possible = || Accepted::possible().collect::<Vec<&str>>().join(", ");
+    Accepted::from_codes(text).map_err(|code| format!("`{code}` is none of {}", possible()))
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

@@ -61,7 +61,7 @@ fn conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<Conv
         damping: stated.damping.clone(),
     };
     let mut files = of_manifest_or_job(&model, &job)?;
-    files.allow_implausible |= stated.allow_implausible;
+    files.allow_implausible = files.allow_implausible.and(stated.allow_implausible.accepted());
     files.keep_soft_rotations |= stated.keep_soft_rotations;
     let hertz = |lambda: f64| lambda.sqrt() / std::f64::consts::TAU * prepared.hertz;
     let request = ConversionRequest {

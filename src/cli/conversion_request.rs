@@ -60,7 +60,7 @@ impl ConvertArguments {
                 return Err(Diagnostic::new(Code::Usage, message).into());
             }
         };
-        files.allow_implausible |= self.allow_implausible;
+        files.allow_implausible = files.allow_implausible.and(self.allow_implausible.unwrap_or_default());
         files.keep_soft_rotations |= self.keep_soft_rotations;
         // The summary names what the elements would give, unless the command line leaves it out.
         files.describe_elements |= self.geometric_stiffness.is_none_or(|loads| !loads.is_empty());

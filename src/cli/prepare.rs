@@ -17,7 +17,8 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
         return Err(usage("modes of a cluster cannot be certified: use --accuracy standard"));
     }
     let mut files = of_manifest_or_job(&arguments.model, &arguments.job)?;
-    files.allow_implausible |= arguments.allow_implausible;
+    let accepted = arguments.allow_implausible.unwrap_or_default();
+    files.allow_implausible = files.allow_implausible.and(accepted);
     files.keep_soft_rotations |= arguments.keep_soft_rotations;
     files.keep_in = Some(folder_around(&arguments.output));
     if !files.residual_vectors.is_empty() {
@@ -44,7 +45,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
             dimension: arguments.job.dimension,
             interfaces: arguments.job.interface.clone(),
             damping: arguments.job.damping.clone(),
-            allow_implausible: arguments.allow_implausible,
+            allow_implausible: accepted.codes().into(),
             keep_soft_rotations: arguments.keep_soft_rotations,
         },
     };

@@ -143,6 +143,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("FB107", "tests/program/odd_files.rs"),
     ("FB121", "crates/file/tests/file/store_output.rs"),
     ("FB132", "tests/program/hostile_files.rs"),
+    ("FB133", "tests/program/models/deck_warnings.rs"),
+    ("FB134", "tests/program/models/deck_warnings.rs"),
     ("FB429", "crates/body/tests/body/soft_rotations.rs"),
     ("FB444", "crates/model/tests/model/uniform_strains.rs"),
     ("FB460", "crates/model/tests/model/uniform_strains.rs"),

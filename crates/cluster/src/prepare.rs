@@ -9,7 +9,7 @@ use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::{generator, sha256_hex};
 use flexbody_body::basis::{first_eigenvalue_estimate, rigid_modes};
 use flexbody_eigen::{Accuracy, CLUSTER_GAP, FIRST_SHIFT, Wanted};
-use flexbody_model::FeModel;
+use flexbody_model::{Accepted, FeModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -210,11 +210,46 @@ pub struct ModelReference {
     /// Damping of the job.
     #[serde(default)]
     pub damping: Option<String>,
-    /// True if implausible findings were treated as warnings.
-    pub allow_implausible: bool,
+    /// Checks whose findings were treated as warnings.
+    pub allow_implausible: AcceptedChecks,
     /// True if soft rotations stayed as K has them.
     #[serde(default)]
     pub keep_soft_rotations: bool,
+}
+
+/// Checks whose findings were treated as warnings.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum AcceptedChecks {
+    /// Their codes.
+    Codes(Vec<String>),
+    /// All checks that `true` accepts, or none: folders of former versions.
+    All(bool),
+}
+
+impl AcceptedChecks {
+    /// Returns the checks; unknown codes, of later versions, are left out.
+    pub fn accepted(&self) -> Accepted {
+        match self {
+            Self::All(all) => Accepted::from(*all),
+            Self::Codes(codes) => codes
+                .iter()
+                .flat_map(|code| Accepted::from_codes(code))
+                .fold(Accepted::default(), Accepted::and),
+        }
+    }
+}
+
+impl Default for AcceptedChecks {
+    fn default() -> Self {
+        Self::Codes(Vec::new())
+    }
+}
+
+impl From<Vec<&str>> for AcceptedChecks {
+    fn from(codes: Vec<&str>) -> Self {
+        Self::Codes(codes.into_iter().map(str::to_owned).collect())
+    }
 }
 
 /// Requested modes: a number, or all below an eigenvalue.

@@ -9,6 +9,7 @@ mod deck_mesh;
 mod deck_of_elements;
 mod deck_scope;
 mod deck_surfaces;
+mod dependent_rows;
 mod described;
 mod described_file;
 mod element_kinds;
@@ -18,6 +19,7 @@ mod knots;
 mod matrix_files;
 mod nastran;
 mod siblings;
+mod transformed;
 
 use super::node_file::NodeFile;
 use abaqus::Abaqus;

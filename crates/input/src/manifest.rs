@@ -14,7 +14,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, read_toml, real};
 use flexbody_base::units::UnitSystem;
-use flexbody_model::{Damping, Description, GeometricStiffness, LoadKind, UnitLoad, damping_bands};
+use flexbody_model::{Accepted, Damping, Description, GeometricStiffness, LoadKind, UnitLoad, damping_bands};
 use std::ops::{Deref, DerefMut, Range};
 use std::path::Path;
 use toml::de::DeValue;
@@ -94,8 +94,9 @@ impl ManifestWalk<'_, '_> {
             self.string(table, "name")
         });
         let dimension = model_keys.and_then(|table| self.dimension(table)).unwrap_or(3);
-        let [allow_implausible, keep_soft_rotations] = ["allow_implausible", "keep_soft_rotations"]
-            .map(|key| model_keys.and_then(|table| self.flag(table, key)).unwrap_or(false));
+        let allow_implausible = model_keys.map(|table| self.accepted(table)).unwrap_or_default();
+        let keep_soft_rotations =
+            model_keys.and_then(|table| self.flag(table, "keep_soft_rotations")).unwrap_or(false);
         let units = match model_keys.and_then(|table| self.table(table, "units")) {
             Some((table, span)) => self.units(table, span)?,
             None => UnitSystem::default(),
@@ -215,6 +216,36 @@ impl ManifestWalk<'_, '_> {
                 None
             }
         }
+    }
+
+    /// Reads the checks whose findings are accepted: a list of their codes, or `true` for those of former versions.
+    fn accepted(&mut self, table: &TomlTable) -> Accepted {
+        const KEY: &str = "allow_implausible";
+        let Some(value) = table.get(KEY) else { return Accepted::default() };
+        let expected = || {
+            format!("true, false, or a list of {}", Accepted::possible().collect::<Vec<&str>>().join(", "))
+        };
+        let DeValue::Array(list) = value.get_ref() else {
+            if let DeValue::Boolean(all) = value.get_ref() {
+                return Accepted::from(*all);
+            }
+            self.mistyped(KEY, value, &expected());
+            return Accepted::default();
+        };
+        let mut accepted = Accepted::default();
+        for item in list.iter() {
+            match item.get_ref() {
+                DeValue::String(code) => match Accepted::from_codes(code) {
+                    Ok(check) => accepted = accepted.and(check),
+                    Err(code) => {
+                        let message = format!("`{KEY}` has `{code}`, expected {}", expected());
+                        self.complain(Code::ManifestSyntax, item.span(), message);
+                    }
+                },
+                _ => self.mistyped(KEY, item, &expected()),
+            }
+        }
+        accepted
     }
 
     fn units(&mut self, table: &TomlTable, span: Range<usize>) -> Option<UnitSystem> {

@@ -7,7 +7,7 @@ use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::ties::{first_smallest, sort_ascending};
-use flexbody_model::{Coupling, Damping, Description, GeometricStiffness, Reference};
+use flexbody_model::{Accepted, Coupling, Damping, Description, GeometricStiffness, Reference};
 use nalgebra::Vector3;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -19,9 +19,8 @@ pub struct ModelFiles {
     pub description: Description,
     /// Number of dimensions: 3 or 2.
     pub dimension: u8,
-    /// True if implausible properties that a person has checked are warnings: see
-    /// [`RawModel`](flexbody_model::RawModel).
-    pub allow_implausible: bool,
+    /// Checks whose findings are warnings because the user accepted them: see [`RawModel`](flexbody_model::RawModel).
+    pub allow_implausible: Accepted,
     /// True if soft rotations stay as K has them: see [`RawModel`](flexbody_model::RawModel).
     pub keep_soft_rotations: bool,
     /// Source of matrices, nodes and labels.
@@ -410,7 +409,7 @@ impl ModelFiles {
                 units.map_or_else(|| Ok(UnitSystem::default()), parse_units)?,
             ),
             dimension: 3,
-            allow_implausible: false,
+            allow_implausible: Accepted::default(),
             keep_soft_rotations: false,
             source,
             mesh: None,

@@ -71,7 +71,7 @@ pub(super) fn read(file: &InputFile, dataset: Option<&str>) -> Diagnosed<Array> 
         format!("file begins with `{}`", start.escape_ascii())
     };
     Err(vec![Diagnostic::new(Code::FileFormatUnknown, what).with_help(
-        "give a NumPy array (.npy), an HDF5 file (FILE.h5:/dataset) or a Matrix Market array (.mtx)",
+        "give a NumPy array (.npy), an HDF5 file (FILE.h5:/dataset), a Matrix Market array (.mtx) or a matrix of OUTPUT4 (FILE.op4:/PHIG)",
     )])
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod materials;
 pub(crate) mod node_pairs;
 pub(crate) mod rigid_motion;
 pub(crate) mod separate_bodies;
+pub(crate) mod strained;
 pub(crate) mod stress;
 pub(crate) mod stress_loads;
 pub(crate) mod stress_notes;
@@ -110,7 +111,7 @@ pub(crate) fn check_body(mut body: Assembled, mut diagnostics: Vec<Diagnostic>) 
     let mass_path = body.origin.mass.path.clone();
     let stress_files = std::mem::take(&mut body.origin.geometric_stiffness);
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
-    let allowed = body.origin.allow_implausible;
+    let allowed = body.origin.allow_implausible.accepts(Code::RecoveryContradicts);
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass).with_followers(followers);
     model.find_fixed_mass(mass_rounding);
     let kept = unrotated_mass_note(&model, mass_rounding, [first, second]);

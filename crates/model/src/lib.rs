@@ -8,6 +8,7 @@
     clippy::unwrap_used
 )]
 
+mod accepted;
 mod body_number;
 mod checks;
 mod damping;
@@ -28,6 +29,7 @@ mod surface;
 mod test_rounding;
 mod wording;
 
+pub use accepted::Accepted;
 pub use body_number::BodyNumber;
 pub use checks::density::{Densities, SoundSpeed};
 pub use checks::separate_bodies::check_bodies;
@@ -52,6 +54,6 @@ pub use recovery::stress_labels::STRAIN_NAMES;
 pub use recovery::stress_nodes::{NodalStress, StressNodes};
 pub use recovery::stress_points::{StressPoint, pascals};
 pub use recovery::{AnsweredShapes, ModelRecovery, Quantity, RecoveryOperator, RecoveryRow, ShapeSteps};
-pub use rows::given_rows::{GivenRows, LostRow, NodeAxes, RowMap};
+pub use rows::given_rows::{DependentRow, GivenRows, LostRow, NodeAxes, RowMap};
 pub use rows::{Rows, centre_and_length, extents, rigid_axes, rigid_count, rigid_fields, span};
 pub use surface::{Skin, SurfaceMesh, skin};

@@ -125,7 +125,7 @@ def model(
     units: _types.Units | None = None,
     damping: _types.Damping | None = None,
     residual_vectors: _types.ResidualLoads | Sequence[_types.ResidualLoads] = (),
-    allow_implausible: bool = False,
+    allow_implausible: bool | Sequence[str] = False,
     keep_soft_rotations: bool = False,
 ) -> Model:
     """Creates a finite element model from matrices and checks it.
@@ -160,7 +160,9 @@ def model(
     residual_vectors
         Loads whose static responses join free modes: "interfaces", "centrifugal", or both in a list.
     allow_implausible
-        True to treat implausible densities, and mass coupling between nodes without stiffness, as warnings.
+        Codes of the checks whose findings are warnings instead of errors: FB437 (density, speed of sound), FB433 (mass
+        coupling between nodes without stiffness), FB460 (stresses that contradict the stiffness), FB410 (rotations that
+        strain the stiffness while translations do not). True for the first three.
     keep_soft_rotations
         True to leave rotations that only elements that are not quite coplanar hold as K has them, instead of making
         them follow the nodes around them.
@@ -187,7 +189,7 @@ def model(
         units=_inputs.unit_names(units),
         damping=_inputs.damping_of(damping),
         residual_vectors=_inputs.residual_loads(residual_vectors),
-        allow_implausible=allow_implausible,
+        allow_implausible=allow_implausible if isinstance(allow_implausible, bool) else list(allow_implausible),
         keep_soft_rotations=keep_soft_rotations,
     )
 
@@ -244,7 +246,7 @@ def convert(
     units: _types.Units | None = None,
     damping: _types.Damping | None = None,
     residual_vectors: _types.ResidualLoads | Sequence[_types.ResidualLoads] = (),
-    allow_implausible: bool = False,
+    allow_implausible: bool | Sequence[str] = False,
     keep_soft_rotations: bool = False,
 ) -> Body: ...
 

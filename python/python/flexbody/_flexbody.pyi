@@ -741,7 +741,7 @@ class Model:
         units: tuple[str, str, str] | None,
         damping: float | tuple[float, float] | list[tuple[float, float]] | _Compressed | None,
         residual_vectors: tuple[bool, bool],
-        allow_implausible: bool,
+        allow_implausible: bool | list[str],
         keep_soft_rotations: bool,
     ) -> Model:
         """Makes a model from arrays, which `flexbody.model` prepares."""

@@ -1,13 +1,14 @@
 //! Arguments of the commands for clusters and batches.
 
 use super::headings::{COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT};
-use super::{JobArguments, Printing, memory_size, names, positive};
+use super::{JobArguments, Printing, accepted, memory_size, names, positive};
 use clap::builder::TypedValueParser;
 use clap::{Args, ValueEnum};
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::FrameChoice;
 use flexbody_cluster::Solver;
 use flexbody_eigen::Accuracy;
+use flexbody_model::Accepted;
 use std::path::PathBuf;
 
 /// Heading of the options of computations on a cluster.
@@ -23,9 +24,11 @@ pub struct PrepareArguments {
     /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
-    #[arg(long, help_heading = MODEL)]
-    pub allow_implausible: bool,
+    /// Treat findings as warnings instead of errors, each check by its code: FB437 (density, speed of sound), FB433 (mass
+    /// coupling without stiffness), FB460 (stresses of a recovery that contradict K), FB410 (rotations that strain K while
+    /// translations do not). Without codes: FB433, FB437 and FB460
+    #[arg(long, value_name = "CODES", value_parser = accepted, num_args = 0..=1, require_equals = true, default_missing_value = "all", help_heading = MODEL)]
+    pub allow_implausible: Option<Accepted>,
     /// Leave rotations that only elements that are not quite coplanar hold as K has them, instead of making them
     /// follow the nodes around them (FB428)
     #[arg(long, help_heading = MODEL)]

@@ -5,13 +5,14 @@ use super::EngineArguments;
 use super::headings::{COMPARISON, COST, FRAME, MODEL, MODES, OUTPUT, SCENE, STRESS};
 #[cfg(feature = "import")]
 use super::import::ForeignArguments;
-use super::{JobArguments, Printing, StatedArguments, memory_size, names, positive, stress_loads};
+use super::{JobArguments, Printing, StatedArguments, accepted, memory_size, names, positive, stress_loads};
 use clap::Args;
 use flexbody_body::basis::BasisKind;
 use flexbody_body::convert::StressLoads;
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::FrameChoice;
 use flexbody_eigen::{Accuracy, FactorChoice};
+use flexbody_model::Accepted;
 use std::path::PathBuf;
 
 /// Arguments of `convert`.
@@ -41,9 +42,11 @@ pub struct ConvertArguments {
     /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
     #[arg(long, value_name = "FILE", requires = "stiffness", help_heading = MODEL)]
     pub dofs: Option<PathBuf>,
-    /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
-    #[arg(long, help_heading = MODEL)]
-    pub allow_implausible: bool,
+    /// Treat findings as warnings instead of errors, each check by its code: FB437 (density, speed of sound), FB433 (mass
+    /// coupling without stiffness), FB460 (stresses of a recovery that contradict K), FB410 (rotations that strain K while
+    /// translations do not). Without codes: FB433, FB437 and FB460
+    #[arg(long, value_name = "CODES", value_parser = accepted, num_args = 0..=1, require_equals = true, default_missing_value = "all", help_heading = MODEL)]
+    pub allow_implausible: Option<Accepted>,
     /// Leave rotations that only elements that are not quite coplanar hold as K has them, instead of making them
     /// follow the nodes around them (FB428)
     #[arg(long, help_heading = MODEL)]

@@ -108,6 +108,10 @@ codes! {
         "The deck ties degrees of freedom together (multi-point constraints, rigid elements), so the dependent rows are combined with the independent ones.";
     InputChanged = "FB132", Error, BadInput, "file changed while it was read", "run again after the program that writes the file has finished",
         "Size, time or content of the file was different at the end of the reading: another program writes it.";
+    DeckDamping = "FB133", Warning, Done, "dashpots of the deck are not in the body", "state the damping of the modes (--damping, [damping] of a manifest: also as a matrix), or give the dashpots to the multibody program as force elements at interfaces",
+        "Dashpots are in neither of the matrices K and M, and the body has only the damping that is stated.";
+    DeckStressed = "FB134", Warning, Done, "stiffness of the deck contains the stress of an earlier step", "write K in a first step without PERTURBATION, and give the stress stiffness as [[geometric_stiffness]]",
+        "A step with PERTURBATION after another one writes the stiffness under the loads of that step. It resists rotations (FB410), and acts whatever the loads of the body are.";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/reference/input.md for the keys",
         "The text is not TOML, a key is misspelled or missing, or a value has another type than its key.";
@@ -259,7 +263,7 @@ codes! {
         "Interface motions must be independent, and a shared node would belong to two of them.";
     InterfaceFit = "FB432", Warning, Done, "interface declared rigid deforms in the modes", "convert with --basis craig-bampton (select, trade and simulate take the body file), or declare the interface averaging",
         "The modes were computed without rigid interfaces, so the nodes of the interface move relative to each other in them.";
-    MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows are in another order, or it belongs to another mesh", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so",
+    MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows are in another order, or it belongs to another mesh", "write K and M from the same analysis in the same order; --allow-implausible=FB433 (or allow_implausible = [\"FB433\"] in [model]) if the model is meant so",
         "Mass joins nodes of one element, and these are also joined by stiffness. Here many pairs have mass only.";
     MassPairs = "FB434", Warning, Done, "mass matrix couples nodes that the stiffness matrix does not", "nothing to do if the model is meant so; else write K and M in the same order",
         "A mass element, or a mass spread over several nodes, joins nodes in M that no element joins in K.";
@@ -267,7 +271,7 @@ codes! {
         "Neighbouring nodes have different masses where their stiffness is alike, and the masses fit only if the two nodes are exchanged: M was written in another order of nodes than K.";
     SpeedImplausible = "FB436", Warning, Done, "speed of sound is outside the range of all known materials: stiffness, mass and lengths do not fit the units of the model", "check that density, Young's modulus and coordinates are all in the units of the manifest, or state these with --units",
         "The speed of sound that K, M and the node distances imply is that of no material.";
-    DensityImplausible = "FB437", Error, BadInput, "density or speed of sound is outside the range of all known materials: the numbers do not fit the units of the model", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant",
+    DensityImplausible = "FB437", Error, BadInput, "density or speed of sound is outside the range of all known materials: the numbers do not fit the units of the model", "check the units of the manifest and of the coordinates; --allow-implausible=FB437 (or allow_implausible = [\"FB437\"] in [model]) if the density is meant",
         "Mass per volume or the speed of sound is far from all materials, as with coordinates in mm and matrices in m, or both are those of a metal in other units than the stated ones.";
     MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass",
         "The matrix given as mass vanishes for rigid motions as a stiffness does, and the other one does not.";
@@ -311,7 +315,7 @@ codes! {
         "Points of a recovery have the stresses xx, yy and xy, with or without zz, and none across the plane. Von Mises and principal stresses are those of a plane state.";
     RecoveryNoEquivalent = "FB459", Note, Done, "no von Mises and principal stresses are formed of stresses that look like a tensor", "name the components xx, yy, zz, xy, yz, xz (or 11, S11, sigma_xx and their like), and let the name of each row end with its component: `e1 xx`",
         "Several stresses of one place look like a tensor, but their components are not known, not complete, or not at the end of the names of the rows. The rows are used one by one, without an equivalent stress.";
-    RecoveryContradicts = "FB460", Error, BadInput, "stresses of a recovery contradict the stiffness of the model under uniform strain", "check the order, signs and units of the rows (shear stresses belong to s_xy, not to twice or half of it), and that the operator belongs to this model; --allow-implausible (or allow_implausible in [model]) if the rows are meant so",
+    RecoveryContradicts = "FB460", Error, BadInput, "stresses of a recovery contradict the stiffness of the model under uniform strain", "check the order, signs and units of the rows (shear stresses belong to s_xy, not to twice or half of it), and that the operator belongs to this model; --allow-implausible=FB460 (or allow_implausible = [\"FB460\"] in [model]) if the rows are meant so",
         "Under uniform strain all points of a homogeneous solid have one stress, which K gives: s : E V = u'K u. The rows give another.";
     RecoveryUncompared = "FB461", Note, Done, "stresses of a recovery were not compared with the stiffness, or only along other axes", "nothing to do; compare stresses under one load with those of the FE program",
         "Under uniform strain K is not that of a homogeneous solid, a point lacks components, or its stresses are along axes of elements.";

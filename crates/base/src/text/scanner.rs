@@ -360,13 +360,15 @@ impl BadLines {
         self.count == 0
     }
 
-    /// Returns the diagnostics. If there are more bad lines than are shown, the last diagnostic, with `code`, has their
-    /// number and the place of the first of them.
+    /// Returns the diagnostics. If there are more bad lines than are shown, the last diagnostic has their number and the
+    /// place of the first of them. Its code is `code`, or that of all shown lines if they have one.
     ///
     /// * `line`: word for a line, such as `row`.
     pub fn into_diagnostics(self, code: Code, line: &str) -> Vec<Diagnostic> {
         let more = self.count - self.shown.len();
         let mut all = self.shown;
+        let is_common = |next: &Diagnostic| all.iter().all(|shown| shown.code() == next.code());
+        let common = self.next.as_ref().filter(|next| is_common(next)).map(Diagnostic::code);
         all.extend(self.next.map(|next| {
             let mut message = match more {
                 1 => format!("1 more {line} has errors"),
@@ -375,7 +377,10 @@ impl BadLines {
             if next.line().is_some() {
                 message += if more == 1 { ": this line" } else { ", the first of them in this line" };
             }
-            let mut counted = Diagnostic::new(code, message);
+            let mut counted = match common.filter(|common| *common != code) {
+                Some(common) => Diagnostic::new(common, format!("{message}: {}", next.message())),
+                None => Diagnostic::new(code, message),
+            };
             if let Some(file) = next.file() {
                 counted = counted.in_file(file);
             }

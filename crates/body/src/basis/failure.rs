@@ -1,6 +1,6 @@
 //! Conversion of failures of the eigen-solver to messages that name nodes.
 
-use super::modal_basis::input_error;
+use super::modal_basis::{ALL_DIGITS, input_error};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Error;
@@ -123,9 +123,13 @@ fn mechanism(model: &FeModel, count: usize, vectors: &Mat<f64>) -> Diagnostic {
             "remove the negligible entries that join the bodies and use --split, or connect the bodies",
         )
     } else {
-        Diagnostic::new(Code::Mechanism, message).with_help(
-            "connect the parts or remove the free degree of freedom; use more elements across where a mesh of elements with reduced integration is one element across; in a very thin body, or with large stiffness contrasts, rounding has removed the softest stiffnesses from K",
-        )
+        let help = "connect the parts or remove the free degree of freedom; use more elements across where a mesh of elements with reduced integration is one element across; in a very thin body, or with large stiffness contrasts, rounding has removed the softest stiffnesses from K";
+        let digits = model.digits();
+        Diagnostic::new(Code::Mechanism, message).with_help(if digits < ALL_DIGITS {
+            format!("{help}: its values have {digits} digits, write all of them")
+        } else {
+            help.to_owned()
+        })
     }
 }
 

@@ -80,7 +80,7 @@ pub struct ModalBasis {
 const MAX_RIGID_ENERGY: f64 = 0.05;
 
 /// Decimal digits of numbers written without loss.
-const ALL_DIGITS: u8 = 17;
+pub(super) const ALL_DIGITS: u8 = 17;
 
 /// Relative noise of lambda above which a diagnostic reports the noise.
 const REPORTED_NOISE: f64 = 1e-6;

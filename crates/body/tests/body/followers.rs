@@ -183,7 +183,8 @@ fn the_matrices_alone_do_not_tell_with_what_the_mass_turns() {
     let body = converted(&FeModel::from_raw(carrier.raw.clone()).expect("a body").model, 12).body;
     let alone = RawModel { followers: None, ..carrier.raw };
     assert!(FeModel::from_raw(alone.clone()).expect_err("foreign pairs").has(Code::MassOrder));
-    let alone = FeModel::from_raw(RawModel { allow_implausible: true, ..alone }).expect("allowed").model;
+    let alone =
+        FeModel::from_raw(RawModel { allow_implausible: true.into(), ..alone }).expect("allowed").model;
     let other = converted(&alone, 12).body;
     let [found, wrong] = [&body, &other].map(|body| body.invariants().w2().expect("W2"));
     assert!((&found - &wrong).norm_max() > 0.1 * found.norm_max());

@@ -95,7 +95,7 @@ fn shared() -> Vec<Case> {
         let mut files =
             ModelFiles::from_arguments(k, m, nodes, Some(path("dofs.csv")), None).expect("no units");
         // Some models are in mm, t, s without stating it; the numbers are not affected.
-        files.allow_implausible = true;
+        files.allow_implausible = true.into();
         let sylvester = &modes["sylvester"];
         Case {
             name: folder.file_name().expect("a folder").to_string_lossy().into_owned(),

@@ -31,7 +31,7 @@ fn models() -> Vec<(String, FeModel)> {
             ModelFiles::from_arguments(file("K.mtx.gz"), file("M.mtx.gz"), file("nodes.csv"), dofs, None);
         let mut files = files.expect("default units");
         // Some models are in mm, t, s without stating it; the numbers are not affected.
-        files.allow_implausible = true;
+        files.allow_implausible = true.into();
         let raw = read_model(&files).expect("readable files");
         (folder.display().to_string(), FeModel::from_raw(raw).expect("a sound model").model)
     };

@@ -2,6 +2,7 @@
 //! into the folder of the deck `job.inp`, as `row column value` (FORMAT=COORDINATE) or with the node and the direction
 //! of row and column (FORMAT=MATRIX INPUT, LABELS). The matrices may instead be those of a substructure.
 
+use super::calculix::{dashpots_left_out, refuse_axisymmetric};
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::described::{DescribedRows, Program, described_of_job, nothing};
@@ -37,18 +38,32 @@ impl JobReader for Abaqus {
     }
 
     fn recognises(&self, path: &Path) -> bool {
-        is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
+        is_deck(path)
+            && (Matrices::beside(path).is_ok()
+                || substructure_of(path).is_some()
+                || !Matrices::of_other_jobs(path).is_empty())
+    }
+
+    fn names_matrices(&self) -> bool {
+        true
     }
 
     fn read(&self, job: &JobFile, describe: bool) -> Diagnosed<JobModel> {
         let path = job.path.as_path();
-        let matrices = Matrices::beside(path);
+        let matrices = match &job.matrices {
+            Some(names) => Ok(Matrices::named(path, names)?),
+            None => Matrices::beside(path),
+        };
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::read(&deck, describe)?;
+        refuse_axisymmetric(&mesh, path)?;
         let (rows, note) = match (matrices, file_of(&deck, path)) {
             (Ok(matrices), _) => (Rows::of_model(&matrices, &mesh, path)?, matrices.note),
             (Err(_), Some((file, note))) => (Rows::of_substructure(&file, &deck, &mesh)?, note),
-            (Err(missing), None) => return Err(missing),
+            (Err(missing), None) => {
+                let matrices = Matrices::fitting(&mesh, path)?.ok_or(missing)?;
+                (Rows::of_model(&matrices, &mesh, path)?, matrices.note)
+            }
         };
         let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
         let described = if !describe {
@@ -60,6 +75,7 @@ impl JobReader for Abaqus {
             let labels = DescribedRows::new(Program::Abaqus, &rows.labels, &no_rotations);
             Some(described_of_job(&deck, &mesh, &labels))
         };
+        let dashpots = dashpots_left_out(&mesh, path);
         let deck_files = deck.seen()?.into_iter();
         Ok(JobModel {
             stiffness: rows.stiffness,
@@ -71,7 +87,7 @@ impl JobReader for Abaqus {
             elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
             sets: mesh.sets,
             files: deck_files.chain(rows.files).collect(),
-            diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
+            diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).chain(dashpots).collect(),
             followers: None,
             described,
         })
@@ -151,7 +167,17 @@ fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diag
     })
 }
 
+/// Stiffness and mass files of a job by their steps.
+type StepFiles = [BTreeMap<u32, PathBuf>; 2];
+
+/// Returns the kind (0: stiffness, 1: mass) and the step of a file by the end of its name in lower case: `stif1.mtx`.
+fn kind_and_step(end: &str) -> Option<(usize, u32)> {
+    let number = |kind: &str| end.strip_prefix(kind)?.strip_suffix(".mtx")?.parse::<u32>().ok();
+    ["stif", "mass"].iter().enumerate().find_map(|(k, kind)| Some((k, number(kind)?)))
+}
+
 /// Files of the two matrices.
+#[derive(Clone)]
 struct Matrices {
     stiffness: PathBuf,
     mass: PathBuf,
@@ -163,15 +189,17 @@ impl Matrices {
     /// Finds the files with the name of the deck, STIF or MASS, and the number of a step: those of the last step that
     /// has both; else the last file of each.
     fn beside(deck: &Path) -> Diagnosed<Self> {
-        let mut found: [BTreeMap<u32, PathBuf>; 2] = Default::default();
+        let mut found: StepFiles = Default::default();
         for (rest, path) in siblings(deck) {
-            let rest = rest.trim_start_matches('_');
-            let number = |kind: &str| rest.strip_prefix(kind)?.strip_suffix(".mtx")?.parse::<u32>().ok();
-            for (k, kind) in ["stif", "mass"].iter().enumerate() {
-                found[k].extend(number(kind).map(|number| (number, path.clone())));
+            if let Some((k, number)) = kind_and_step(rest.trim_start_matches('_')) {
+                found[k].insert(number, path);
             }
         }
-        let [stiffness, mass] = &found;
+        Self::of_last_step(&found, deck)
+    }
+
+    /// Chooses the files of the last step that has both matrices; else the last file of each.
+    fn of_last_step([stiffness, mass]: &StepFiles, deck: &Path) -> Diagnosed<Self> {
         let shared = stiffness.keys().rev().find(|number| mass.contains_key(number));
         let last = || stiffness.keys().next_back().zip(mass.keys().next_back());
         let Some((k, m)) = shared.map(|number| (number, number)).or_else(last) else {
@@ -193,6 +221,98 @@ impl Matrices {
         };
         let note = message.map(|message| Diagnostic::new(Code::JobStep, message).in_file(&stiffness[k]));
         Ok(Self { stiffness: stiffness[k].clone(), mass: mass[m].clone(), note })
+    }
+}
+
+// Matrices of a job with another name than its deck: `abaqus job=A input=B.inp` writes A_STIF1.mtx beside B.inp.
+
+impl Matrices {
+    /// Returns the files that the user names, with or without the extension.
+    ///
+    /// # Errors
+    /// FB109 for a file that does not exist.
+    fn named(deck: &Path, names: &[String; 2]) -> Diagnosed<Self> {
+        let file = |name: &String| {
+            let path = deck.with_file_name(name);
+            let with_extension = deck.with_file_name(format!("{name}.mtx"));
+            let existing = [path, with_extension].into_iter().find(|path| path.is_file());
+            let help = "name the files of the matrices: --matrices A_STIF1.mtx,A_MASS1.mtx";
+            existing.ok_or_else(|| vec![missing(deck, &format!("beside the deck, the file {name}"), help)])
+        };
+        let (stiffness, mass) = both(file(&names[0]), file(&names[1]))?;
+        Ok(Self { stiffness, mass, note: None })
+    }
+
+    /// Returns the pairs of matrices in the folder of a deck that are named like no deck in it.
+    fn of_other_jobs(deck: &Path) -> Vec<Self> {
+        let folder = deck.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut names: Vec<_> = listed.map(|file| file.file_name()).collect();
+        names.sort();
+        let lower = |name: &std::ffi::OsString| name.to_string_lossy().to_lowercase();
+        let decks: BTreeSet<String> =
+            names.iter().filter_map(|name| Some(lower(name).strip_suffix(".inp")?.to_owned())).collect();
+        let mut jobs: BTreeMap<String, StepFiles> = BTreeMap::new();
+        for name in &names {
+            let lower = lower(name);
+            let Some((job, rest)) = lower.rsplit_once('_') else { continue };
+            if let Some((k, number)) = kind_and_step(rest).filter(|_| !decks.contains(job)) {
+                jobs.entry(job.to_owned()).or_default()[k].insert(number, deck.with_file_name(name));
+            }
+        }
+        let is_pair = |files: &&StepFiles| files.iter().all(|of_kind| !of_kind.is_empty());
+        jobs.values().filter(is_pair).filter_map(|files| Self::of_last_step(files, deck).ok()).collect()
+    }
+
+    /// Returns the only pair of matrices of another job whose rows are those of the deck, with a note; `None` if there is
+    /// none.
+    ///
+    /// # Errors
+    /// FB111 if several pairs fit.
+    fn fitting(mesh: &DeckMesh, deck: &Path) -> Diagnosed<Option<Self>> {
+        let all = Self::of_other_jobs(deck);
+        let mut fitting: Vec<Self> = all.iter().filter(|pair| pair.fits(mesh, deck)).cloned().collect();
+        if fitting.is_empty() && all.len() == 1 {
+            // The errors of the only pair say why it does not fit.
+            fitting = all;
+        }
+        let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let names = |pair: &Self| [&pair.stiffness, &pair.mass].map(|path| name(path).unwrap_or_default());
+        match fitting.as_slice() {
+            [] => Ok(None),
+            [pair] => {
+                let [k, m] = names(pair);
+                let steps = pair.note.as_ref().map_or(String::new(), |note| format!(" ({})", note.message()));
+                let message =
+                    format!("the matrices are those of a job with another name: {k} and {m}{steps}");
+                let note = Diagnostic::new(Code::JobStep, message).in_file(deck);
+                let help = format!(
+                    "nothing to do if the job was run with this deck; else name the files: --matrices {k},{m}"
+                );
+                Ok(Some(Self { note: Some(note.with_help(help)), ..pair.clone() }))
+            }
+            several => {
+                let all: Vec<String> = several.iter().map(|pair| names(pair).join(" and ")).collect();
+                let [k, m] = names(&several[0]);
+                let message = format!("matrices of {} jobs fit the deck: {}", several.len(), all.join("; "));
+                let help = format!(
+                    "name the files: --matrices {k},{m}, or matrices = [\"{k}\", \"{m}\"] in [files] of a manifest"
+                );
+                Err(vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(deck).with_help(help)])
+            }
+        }
+    }
+
+    /// Returns true if the rows of the stiffness are those of the deck: nodes by their labels, else their number.
+    fn fits(&self, mesh: &DeckMesh, deck: &Path) -> bool {
+        let fits = || -> Diagnosed<bool> {
+            if has_labels(&self.stiffness)? {
+                let (labels, _) = labelled([&self.stiffness, &self.mass])?;
+                return Ok(labels.iter().all(|label| mesh.nodes.contains_key(&label.node)));
+            }
+            Ok(CoordinateFile::read(&self.stiffness, u32::MAX)?.rows() == labels(mesh, deck)?.len())
+        };
+        fits().unwrap_or(false)
     }
 }
 

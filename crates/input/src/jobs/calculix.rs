@@ -5,18 +5,21 @@ use super::couplings::Coupling;
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
-use super::described::{DescribedRows, Program, described_of_job, nothing};
+use super::dependent_rows::with_dependent_rows;
+use super::described::{DescribedRows, Program, constraints, described_of_job, nothing};
+use super::element_kinds::is_axisymmetric;
 use super::expanded::{Once, copies_in_sets, label_once};
-use super::job::{JobFile, JobModel, JobReader, both, missing};
+use super::job::{JobFile, JobModel, JobReader, both, damping_left_out, missing, refused_elements};
 use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
-use super::siblings::is_deck;
+use super::siblings::{is_deck, siblings};
+use super::transformed::along_model;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::scanner::{Line, Lines, excerpt, expected, integer, real};
-use flexbody_elements::DescribedElements;
-use flexbody_model::{DofLabel, GivenRows, Nodes, RawMatrix};
+use flexbody_elements::{DescribedElements, Equation};
+use flexbody_model::{DofLabel, Nodes, RawMatrix};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -50,8 +53,10 @@ impl JobReader for Calculix {
         if !absent.is_empty() {
             return Err(absent);
         }
+        refuse_reported_errors(path)?;
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::read(&deck, describe)?;
+        refuse_kinds(&mesh, path)?;
         let (labels, dofs_file) = read_labels(&dof)?;
         let rotations = rotation_nodes(&deck, &mesh, &labels)?;
         let means = reference_places(&deck, &mesh)?;
@@ -60,9 +65,14 @@ impl JobReader for Calculix {
         // The files are read one after the other: each uses all threads, and the entries of only one are in memory.
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
+        let ([stiffness, mass], turned) =
+            along_model([stiffness, mass], &labels, &rotations, &deck, &mesh, &dof)?;
+        let is_turned = turned.counts().next().is_some();
         let knots = Knots::of(&mesh, &labels, &rotations, &dof)?;
         let ([stiffness, mass], given_rows) = if knots.are_absent() {
-            ([stiffness, mass], GivenRows::default())
+            ([stiffness, mass], turned)
+        } else if is_turned {
+            return Err(turned_knots(path));
         } else {
             knots.condensed([stiffness, mass], &dof)?
         };
@@ -80,16 +90,20 @@ impl JobReader for Calculix {
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
         nodes.extend(places);
         let is_expanded = has_copies || !knots.are_absent();
+        let equations = if is_expanded { Vec::new() } else { equations_of(&deck, &mesh, &dofs, &rotations) };
         let described =
             if describe { Some(described_job(&deck, &mesh, &dofs, &rotations, is_expanded)) } else { None };
+        let warnings = [dashpots_left_out(&mesh, path), stressed(&deck, path)];
         let elements = mesh.drawn_by_corners();
         let sets = mesh.sets.with_copies(copies_in_sets(copies, &nodes, &dofs));
         let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
+        diagnostics.extend(warnings.into_iter().flatten());
+
         let mut files = deck.seen()?;
         files.extend([("stiffness", stiffness_file), ("mass", mass_file), ("dofs", dofs_file)]);
-        Ok(JobModel {
+        let job = JobModel {
             stiffness,
             mass,
             nodes: Nodes { ids, positions },
@@ -101,8 +115,90 @@ impl JobReader for Calculix {
             diagnostics,
             followers: None,
             described,
-        })
+        };
+        Ok(with_dependent_rows(job, &equations))
     }
+}
+
+/// Returns FB111 for elements whose rows cannot be those of a body in space.
+pub(super) fn refuse_axisymmetric(mesh: &DeckMesh, deck: &Path) -> Diagnosed<()> {
+    let kinds: BTreeSet<&str> = mesh
+        .elements
+        .iter()
+        .map(|elements| elements.kind.as_str())
+        .filter(|kind| is_axisymmetric(kind))
+        .collect();
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    let why = "axisymmetric models have radius and axis for coordinates, and no motion across their plane";
+    let diagnostic = refused_elements(&kinds.into_iter().collect::<Vec<_>>(), why, deck);
+    Err(vec![diagnostic.with_help("revolve the mesh, and write K and M of solid elements in space")])
+}
+
+/// Returns FB111 for axisymmetric elements, and for beams, whose solids have other nodes than the deck.
+fn refuse_kinds(mesh: &DeckMesh, deck: &Path) -> Diagnosed<()> {
+    refuse_axisymmetric(mesh, deck)?;
+    let kinds: BTreeSet<&str> = mesh
+        .elements
+        .iter()
+        .map(|elements| elements.kind.as_str())
+        .filter(|kind| kind.starts_with('B'))
+        .collect();
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    let why = "CalculiX expands beams into solids, whose nodes are not in the deck";
+    let diagnostic = refused_elements(&kinds.into_iter().collect::<Vec<_>>(), why, deck);
+    Err(vec![
+        diagnostic
+            .with_help("use solid elements, or write the beams with a program that keeps their rotations"),
+    ])
+}
+
+/// Returns FB110 if what CalculiX printed was kept beside the deck (`job.log`, `job.out`) and reports an error: CalculiX
+/// continues after some errors, and leaves out what they are about.
+fn refuse_reported_errors(deck: &Path) -> Diagnosed<()> {
+    let logs = siblings(deck).filter(|(rest, _)| rest == ".log" || rest == ".out");
+    for (_, log) in logs {
+        // A log that cannot be read says nothing.
+        let Ok(file) = InputFile::open(&log) else { continue };
+        let reported = Lines::of(file.bytes())
+            .filter_map(Line::content)
+            .find(|line| line.text.trim_ascii_start().starts_with(b"*ERROR"));
+        if let Some(line) = reported {
+            let message = format!("CalculiX reported an error: `{}`", excerpt(line.text));
+            let diagnostic = Diagnostic::new(Code::DeckSyntax, message).in_file(&log).at_line(line.number);
+            return Err(vec![diagnostic.with_help(
+                "correct the deck and run it again: the matrices may lack what the error is about; remove the file if it is of another run",
+            )]);
+        }
+    }
+    Ok(())
+}
+
+/// Returns FB111 for knots of shells among matrices along the axes of nodes.
+fn turned_knots(deck: &Path) -> Vec<Diagnostic> {
+    let message = "GLOBAL=NO: rows of knots of shells are along the axes of a *TRANSFORM";
+    let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
+    vec![diagnostic.with_help("write the matrices without GLOBAL=NO")]
+}
+
+/// Returns the warning that the step with the matrices continues from an earlier one with its stress, if it does.
+fn stressed(deck: &Deck, path: &Path) -> Option<Diagnostic> {
+    let is_writer = |card: &Card| card.parameter("SOLVER").is_some_and(|solver| solver == "MATRIXSTORAGE");
+    let writer = deck.cards().iter().rposition(is_writer)?;
+    let mut steps = deck.cards()[..writer].iter().rev().filter(|card| card.keyword == "STEP");
+    let is_perturbed = steps.next()?.parameter("PERTURBATION").is_some();
+    let message = "K is written in a step with PERTURBATION after another step: it contains the stress of the loads there";
+    (is_perturbed && steps.next().is_some())
+        .then(|| Diagnostic::new(Code::DeckStressed, message).in_file(path))
+}
+
+/// Returns the warning about dashpots of a keyword deck, if it has some.
+pub(super) fn dashpots_left_out(mesh: &DeckMesh, deck: &Path) -> Option<Diagnostic> {
+    let dashpots = mesh.elements.iter().filter(|elements| elements.kind.starts_with("DASHPOT"));
+    damping_left_out(dashpots.map(|elements| elements.members.len()).sum(), "dashpots", deck)
 }
 
 /// Describes the elements of a job, nothing if its matrices have rows of solids into which shells were expanded.
@@ -119,6 +215,17 @@ fn described_job(
     }
     let rows = DescribedRows::new(Program::Calculix, labels, rotations);
     described_of_job(deck, mesh, &rows)
+}
+
+/// Returns the equations of directions without rows; none if a card of the deck cannot be read.
+fn equations_of(
+    deck: &Deck,
+    mesh: &DeckMesh,
+    labels: &[DofLabel],
+    rotations: &HashMap<i64, i64>,
+) -> Vec<Equation> {
+    let rows = DescribedRows::new(Program::Calculix, labels, rotations);
+    constraints(deck, mesh, &rows).map_or_else(|_| Vec::new(), |(equations, _)| equations)
 }
 
 /// Reads a stiffness matrix (`.sti`) and the labels of its rows (`.dof`).

@@ -15,7 +15,7 @@ use super::deck_scope::Elements;
 use super::element_kinds::{Role, n_nodes, role};
 use crate::element_source::is_isotropic;
 use crate::sets::{comparable, dotted};
-use constraints::constraints;
+pub(super) use constraints::constraints;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_elements::{Axes, DescribedElements, Elasticity, ElementGroup, NotDescribed, Section};
 use internal::with_internal_nodes;

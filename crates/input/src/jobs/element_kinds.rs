@@ -34,6 +34,11 @@ impl Family {
     }
 }
 
+/// Returns true for elements of bodies of revolution in the plane of radius and axis.
+pub(super) fn is_axisymmetric(kind: &str) -> bool {
+    ["CAX", "CGAX", "SAX", "MAX"].iter().any(|head| kind.starts_with(head))
+}
+
 /// Returns the family of an element type; `None` if it is unknown.
 pub(super) fn family(kind: &str) -> Option<Family> {
     let begins = |heads: &[&str]| heads.iter().any(|head| kind.starts_with(head));

@@ -10,7 +10,8 @@ mod elimination;
 mod matrices;
 mod systems;
 
-use super::job::{JobFile, JobModel, JobReader, condensed};
+use super::dependent_rows::with_dependent_rows;
+use super::job::{JobFile, JobModel, JobReader, condensed, damping_left_out};
 use crate::bulk_cards::is_bulk_data;
 use crate::node_file::NodeFile;
 use bulk::Bulk;
@@ -61,6 +62,7 @@ impl JobReader for Nastran {
         let places = GridPlaces::new(&nodes, &axes);
         let has_other_matrices = !dmigs.names().is_empty() && bulk.has_elements;
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
+        let (equations, not_described) = matrices.equations(&bulk, &places);
         let described = if describe {
             // The matrices are sound without elements: a card that cannot be read is a reason why nothing is described.
             let read = described(path, &nodes, &bulk, &places, has_other_matrices);
@@ -70,8 +72,7 @@ impl JobReader for Nastran {
                 let not_described = vec![NotDescribed { what, line, nodes: Vec::new() }];
                 DescribedElements { not_described, path: path.to_path_buf(), ..DescribedElements::default() }
             });
-            let (equations, not_described) = matrices.equations(&places);
-            described.equations = equations;
+            described.equations.clone_from(&equations);
             described.not_described.extend(not_described);
             Some(described)
         } else {
@@ -93,7 +94,7 @@ impl JobReader for Nastran {
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
         // With condensed matrices no element has all of its nodes.
         let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
-        Ok(JobModel {
+        let job = JobModel {
             stiffness,
             mass,
             nodes,
@@ -105,7 +106,8 @@ impl JobReader for Nastran {
             files,
             diagnostics,
             described,
-        })
+        };
+        Ok(with_dependent_rows(job, &equations))
     }
 }
 
@@ -181,6 +183,7 @@ fn deck_notes(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
         let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";
         diagnostics.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
     }
+    diagnostics.extend(damping_left_out(bulk.n_dampers, "damping elements (CDAMP, CVISC)", path));
     if let Some((path, line, count)) = &bulk.supports {
         let message = match count {
             1 => "a card supports the body".to_owned(),

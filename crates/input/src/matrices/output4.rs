@@ -10,6 +10,7 @@ use super::named_matrices::{choose, named_or_only};
 use super::operator::OperatorColumns;
 use super::reader::{ArraySource, MatrixSource, Reader};
 use super::rectangular::Rectangular;
+use crate::array::Array;
 use binary::Binary;
 use columns::{Columns, SINGLE_DIGITS, Stored, Stretch};
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
@@ -50,6 +51,11 @@ impl Reader for Output4 {
             contents.matrix(source.file, choose(&contents.names(), source.role, source.group)?)
         };
         read().map_err(|found: Diagnostic| Error::from(found.in_file(path)))
+    }
+
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
+        let read = || read_rectangular(source.file, source.name)?.array();
+        source.is_plain().then(|| read().map_err(|diagnostic| vec![diagnostic]))
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
@@ -273,6 +279,29 @@ mod tests {
                 assert_eq!((&raw.matrix, raw.digits), (&expected, 17));
             }
         }
+    }
+
+    #[test]
+    fn shapes_are_read_as_an_array() {
+        let mut text = format!("{:8}{:8}{:8}{:8}{:8}1P,3E24.16\n", 3, -5, 2, 2, "PHIG");
+        for (column, values) in
+            [[1.0, 0.5, 0.0, -2.0, 4.0], [0.0, 3.0, 0.25, 0.0, 1.0], [7.0; 5]].iter().enumerate()
+        {
+            writeln!(text, "{:8}{:8}{:8}\n{:8}{:8}", column + 1, 0, 12, 11, 1).expect("memory");
+            for three in values.chunks(3) {
+                three.iter().for_each(|value| write!(text, "{value:24.16E}").expect("memory"));
+                text.push('\n');
+            }
+        }
+        write!(text, "{:8}{:8}{:8}\n{:24.16E}\n", 4, 1, 1, 2f64.sqrt()).expect("memory");
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("job.op4");
+        std::fs::write(&path, text).expect("written");
+        let location = crate::model_files::MatrixLocation::parse(format!("{}:/PHIG", path.display()));
+        let shapes = crate::shapes::read_shapes(&location, &[5], "shapes").expect("shapes");
+        assert_eq!((shapes.matrix.nrows(), shapes.matrix.ncols()), (5, 3));
+        assert_eq!(shapes.matrix.col_as_slice(0), [1.0, 0.5, 0.0, -2.0, 4.0]);
+        assert_eq!(shapes.matrix.col_as_slice(1), [0.0, 3.0, 0.25, 0.0, 1.0]);
     }
 
     #[test]

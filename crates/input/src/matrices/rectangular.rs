@@ -2,8 +2,12 @@
 
 use super::assemble::Entry;
 use super::operator::OperatorColumns;
+use crate::array::Array;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::CscMatrix;
+
+/// Decimal digits of a number of 64 bits.
+const ALL_DIGITS: u8 = 17;
 
 /// Matrix that need not be square, with entries from 0.
 pub(crate) struct Rectangular {
@@ -34,6 +38,25 @@ impl Rectangular {
             }
             None => Ok(self),
         }
+    }
+
+    /// Returns the matrix as a dense array.
+    ///
+    /// # Errors
+    /// FB313 for an array that memory does not hold.
+    pub(super) fn array(&self) -> Result<Array, Diagnostic> {
+        let (rows, cols) = (self.rows, self.columns);
+        let mut values: Vec<f64> = Vec::new();
+        let count = rows.checked_mul(cols).filter(|count| values.try_reserve_exact(*count).is_ok());
+        let Some(count) = count else {
+            let message = format!("an array of {rows} x {cols} numbers does not fit into memory");
+            return Err(Diagnostic::new(Code::MatrixTooLarge, message));
+        };
+        values.resize(count, 0.0);
+        for Entry { row, col, value } in &self.entries {
+            values[*col as usize * rows + *row as usize] += value;
+        }
+        Ok(Array { rows, cols, row_major: false, values, digits: ALL_DIGITS })
     }
 
     /// Returns the operator whose rows are those of the matrix.

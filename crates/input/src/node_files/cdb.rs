@@ -63,15 +63,46 @@ fn widths(format: &[u8]) -> Option<[(usize, usize); 2]> {
     (fits(whole) && fits(reals)).then_some([whole, reals])
 }
 
+/// Field of a line of fixed width.
+struct Field {
+    is_real: bool,
+    columns: std::ops::Range<usize>,
+}
+
+/// Returns the fields of a line by a Fortran format of numbers, as in `(3i9,6e21.13e3)` or `(1i7,2i9,6e21.13)`.
+fn fields(format: &[u8]) -> Option<Vec<Field>> {
+    let text = String::from_utf8_lossy(format).trim().to_lowercase();
+    let inner = text.strip_prefix('(')?.strip_suffix(')')?;
+    let mut fields: Vec<Field> = Vec::new();
+    let mut end = 0;
+    for part in inner.split(',').map(str::trim) {
+        let letter = part.find(|c: char| c.is_ascii_alphabetic())?;
+        let is_real = !part[letter..].starts_with('i');
+        if is_real && !part[letter..].starts_with(['e', 'd', 'f', 'g']) {
+            return None;
+        }
+        let count: usize = if letter == 0 { 1 } else { part[..letter].parse().ok()? };
+        let width: usize = part[letter + 1..].split('.').next()?.parse().ok()?;
+        if !(1..=1000).contains(&width) || count > 1000 {
+            return None;
+        }
+        for _ in 0..count {
+            fields.push(Field { is_real, columns: end..end + width });
+            end += width;
+        }
+    }
+    Some(fields)
+}
+
 /// Returns the k-th field of a width. Trailing fields may be missing.
 fn nth_field(line: &[u8], k: usize, width: usize) -> &[u8] {
     field(line, k * width..(k + 1) * width)
 }
 
 fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> Diagnosed<usize> {
-    let format = text.get(head + 1).and_then(|line| widths(line));
-    let Some([(count, width), (reals, length)]) = format.filter(|[whole, reals]| whole.1 > 0 && reals.1 > 0)
-    else {
+    let all = text.get(head + 1).and_then(|line| fields(line)).unwrap_or_default();
+    let (reals, whole): (Vec<&Field>, Vec<&Field>) = all.iter().partition(|field| field.is_real);
+    let (Some(number), false) = (whole.first(), reals.is_empty()) else {
         let message = "the line below NBLOCK is not a format such as (3i9,6e21.13e3)".to_owned();
         return Err(syntax(file, head + 2, message));
     };
@@ -83,13 +114,12 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
         if end.is_empty() {
             continue;
         }
-        let id = integer(nth_field(line, 0, width));
+        let id = integer(field(line, number.columns.clone()));
         // Three coordinates, and three angles of rotated nodes.
         let mut values = [0.0; 6];
         let mut good = id.is_some();
-        for (axis, value) in values.iter_mut().enumerate().take(reals) {
-            let start = count * width + axis * length;
-            let text = field(line, start..start + length);
+        for (value, place) in values.iter_mut().zip(&reals) {
+            let text = field(line, place.columns.clone());
             // Zeros at the end of a line are left out.
             match if text.is_empty() { Some(0.0) } else { real(text) } {
                 Some(number) => *value = number,
@@ -324,4 +354,40 @@ fn with_all_middles(shape: ElementShape, nodes: &[i64]) -> Vec<i64> {
         }
     }
     nodes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_follow_any_format_of_numbers() {
+        let of = |format: &str| {
+            let found = fields(format.as_bytes())?;
+            Some(found.into_iter().map(|field| (field.is_real, field.columns)).collect::<Vec<_>>())
+        };
+        let workbench = of("(1i7,2i9,6e21.13)").expect("a format");
+        assert_eq!(workbench[..4], [(false, 0..7), (false, 7..16), (false, 16..25), (true, 25..46)]);
+        assert_eq!(workbench.len(), 9);
+        assert_eq!(of("(3i9,6e21.13e3)").expect("a format")[3], (true, 27..48));
+        assert_eq!(of("(I8, 2F16.8)"), Some(vec![(false, 0..8), (true, 8..24), (true, 24..40)]));
+        for bad in ["3i9", "(something)", "(i0,3e9.2)", "(3i99999999999999999,6e21.13)", "(2000i8)"] {
+            assert_eq!(of(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn nodes_of_workbench_are_read_by_the_format_of_their_block() {
+        let mut text = String::from("/PREP7\nNBLOCK,6,SOLID,12,2\n(1i7,2i9,6e21.13)\n");
+        for (id, x) in [(5, 0.25), (12, -1.5)] {
+            text += &format!("{id:7}{:9}{:9}{x:21.13e}{:21.13e}{:21.13e}\n", 0, 0, 2.0 * x, 3.0 * x);
+        }
+        text += "N,R5.3,LOC,-1,\n";
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("part.cdb");
+        std::fs::write(&path, text).expect("written");
+        let found = read(&InputFile::open(&path).expect("a file")).expect("nodes").nodes;
+        assert_eq!(found.ids, [5, 12]);
+        assert_eq!(found.positions, [[0.25, 0.5, 0.75], [-1.5, -3.0, -4.5]]);
+    }
 }

@@ -74,6 +74,19 @@ impl StressMatrix {
     /// FB112 for rows that are not those of K, FB308 for a matrix of another size, FB452 for a matrix that is K.
     pub(super) fn of_stress(self, plain: PlainStiffness<'_>, rows: &GivenRows) -> Diagnosed<OfStress> {
         let Self { raw, labels, load_size } = self;
+        if let Some(row) = rows.dependent().first().filter(|_| load_size.is_some()) {
+            let message = format!(
+                "{} follows others by a constraint of the deck, so that K and the matrix with stress have other rows",
+                row.label
+            );
+            let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(&raw.path);
+            return Err(vec![diagnostic.with_help("give the geometric stiffness itself, without load_size")]);
+        }
+        if labels.as_ref().is_some_and(|labels| rows.counts().any(|count| count == labels.len())) {
+            let message = "rows of K are along axes of nodes (GLOBAL=NO), and it is not known along which axes those of the matrix with stress are";
+            let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(&raw.path);
+            return Err(vec![diagnostic.with_help("write both matrices without GLOBAL=NO")]);
+        }
         let matrix = match &labels {
             Some(labels) => in_rows_of(raw, labels, &plain.labels)?,
             None => by_rows_of_model(raw, rows)?,

@@ -184,7 +184,7 @@ fn the_rotor_of_ansys_is_read_as_it_was_written() {
     )
     .expect("files");
     assert!(matches!(files.source, ModelSource::Tables(_)));
-    files.allow_implausible = false;
+    files.allow_implausible = false.into();
     let checked = FeModel::from_raw(read_model(&files).expect("readable")).expect("a free body");
     assert_eq!(checked.model.nodes().len(), 115);
     assert!(

@@ -264,7 +264,7 @@ fn a_mass_spread_over_nodes_is_a_warning() {
 #[test]
 fn what_a_person_has_looked_at_is_a_warning() {
     let raw = raw_fixture("cube_hex8");
-    let allowed = |raw: RawModel| told(RawModel { allow_implausible: true, ..raw });
+    let allowed = |raw: RawModel| told(RawModel { allow_implausible: true.into(), ..raw });
     assert_eq!(allowed(exchanged(&raw, 0, 5)), [Code::MassPairs]);
     assert_eq!(allowed(with_mass_times(&raw, 1e-3))[0], Code::InertiaImplausible);
 }
@@ -326,7 +326,7 @@ fn densities_of_no_matter_are_refused() {
         let error = refused(raw.clone());
         assert!(error.has(Code::DensityImplausible), "{case}: {error}");
         assert_eq!(error.exit_code(), ExitCode::BadInput, "{case}");
-        assert!(FeModel::from_raw(RawModel { allow_implausible: true, ..raw }).is_ok(), "{case}");
+        assert!(FeModel::from_raw(RawModel { allow_implausible: true.into(), ..raw }).is_ok(), "{case}");
     }
     let error = refused(in_units(&bracket, ["mm", "kg", "s"]));
     let help =
@@ -356,7 +356,7 @@ fn numbers_without_units_are_those_of_matter() {
                 && found.help().contains("the numbers fit materials in mm, t, s;"),
             "{error}"
         );
-        let codes = told(RawModel { allow_implausible: true, ..raw.clone() });
+        let codes = told(RawModel { allow_implausible: true.into(), ..raw.clone() });
         assert!(!codes.is_empty() && !codes.contains(&Code::DensityImplausible), "{codes:?}");
     }
     // Plausible numbers in m, kg, s need no units.
@@ -412,7 +412,11 @@ fn other_units_in_which_metric_numbers_are_no_metal_are_confirmed() {
         let found = implausible(&raw);
         assert!(found.message().contains("in m, t, s the same numbers are those of steel"), "{found}");
         assert!(found.help().contains("--allow-implausible"), "{found}");
-        assert_eq!(told(RawModel { allow_implausible: true, ..raw }), [Code::SpeedImplausible], "{units:?}");
+        assert_eq!(
+            told(RawModel { allow_implausible: true.into(), ..raw }),
+            [Code::SpeedImplausible],
+            "{units:?}"
+        );
     }
     // Steel and aluminium in inches and feet.
     for (name, metre, kilogram) in [("bracket_hex20", 1e3, 1e-3), ("cube_hex8", 1.0, 1.0)] {
@@ -449,7 +453,7 @@ fn stiffness_in_another_unit_of_stress_is_refused() {
         let found = implausible(&raw);
         let said = format!("the density is that of {metal}, and so is {ratio} times the speed");
         assert!(found.message().ends_with(&said), "{found}");
-        assert_eq!(told(RawModel { allow_implausible: true, ..raw }), [Code::SpeedImplausible]);
+        assert_eq!(told(RawModel { allow_implausible: true.into(), ..raw }), [Code::SpeedImplausible]);
     }
     // No metal has this density and this speed.
     assert_eq!(told(with_stiffness_times(&bar, 1e-3 / 5.0)), [Code::SpeedImplausible]);

@@ -7,6 +7,7 @@
 //! characteristics. Curved elements are measured by their corners, which changes their volume by some
 //! percent.
 
+use crate::accepted::acceptance;
 use crate::checks::materials::{
     MetalIn, Solid, StiffnessUnit, fitting_units, metal_in_metric_units, stiffness_unit, units_of_speed,
 };
@@ -239,7 +240,7 @@ pub(crate) fn check_density(
         units.length.name(),
         units.mass.name()
     );
-    if body.origin.allow_implausible || !body.has_units() {
+    if allows_density(body) || !body.has_units() {
         diagnostics.push(Diagnostic::new(Code::InertiaImplausible, message));
         return None;
     }
@@ -250,7 +251,8 @@ pub(crate) fn check_density(
         diagnostic = diagnostic.with_help(state_units(&fitting));
     } else if !fitting.is_empty() {
         diagnostic = diagnostic.with_help(format!(
-            "check the units of the manifest and of the coordinates: the numbers fit materials in {fitting}; use --allow-implausible (or allow_implausible in [model]) if the density is intended"
+            "check the units of the manifest and of the coordinates: the numbers fit materials in {fitting}; use {} if the density is intended",
+            acceptance(Code::DensityImplausible)
         ));
     }
     diagnostics.push(diagnostic);
@@ -460,7 +462,7 @@ pub(crate) fn check_speed(
             Some(density) => fitting_units(solid(body, density, speeds.median)).join(", or in "),
             None => units_of_speed(speeds.median).join(", or in "),
         };
-        let unstated = !units.stated && !body.origin.allow_implausible && !fitting.is_empty();
+        let unstated = !units.stated && !allows_density(body) && !fitting.is_empty();
         diagnostics.push(
             if unstated && !diagnostics.iter().any(|diagnostic| diagnostic.code() == Code::DensityImplausible)
             {
@@ -498,19 +500,26 @@ fn metal_in_other_units(
         metal_in_metric_units(solid, units, is_implausible)
     {
         let help = format!(
-            "state the units {units}, or write coordinates and matrices in one system of units; use --allow-implausible (or allow_implausible in [model]) to confirm {names}"
+            "state the units {units}, or write coordinates and matrices in one system of units; use {} to confirm {names}",
+            acceptance(Code::DensityImplausible)
         );
         (format!("{told}, which no known metal has; in {units} the same numbers are those of {metal}"), help)
     } else {
         let StiffnessUnit { metal, factor } = stiffness_unit(density, speed_si)?;
         let (factor, ratio) = (significant(factor, 6), significant(factor.sqrt(), 4));
         let help = format!(
-            "write stiffness and mass in one system of units: K times {factor} fits {names} (MPa are N/mm^2: with lengths in mm they belong to mass in t, density in t/mm^3); use --allow-implausible (or allow_implausible in [model]) if the stiffness is intended"
+            "write stiffness and mass in one system of units: K times {factor} fits {names} (MPa are N/mm^2: with lengths in mm they belong to mass in t, density in t/mm^3); use {} if the stiffness is intended",
+            acceptance(Code::DensityImplausible)
         );
         (format!("{told}: the density is that of {metal}, and so is {ratio} times the speed"), help)
     };
-    let code = if body.origin.allow_implausible { Code::SpeedImplausible } else { Code::DensityImplausible };
+    let code = if allows_density(body) { Code::SpeedImplausible } else { Code::DensityImplausible };
     Some(Diagnostic::new(code, message).with_help(help))
+}
+
+/// Returns true if the user accepts density and speed of sound as they are.
+fn allows_density(body: &Assembled) -> bool {
+    body.origin.allow_implausible.accepts(Code::DensityImplausible)
 }
 
 /// Returns the numbers of the model for a density in kg/m^3 and a speed in the units of the model.
@@ -524,6 +533,7 @@ fn state_units(fitting: &str) -> String {
     let reason =
         if fitting.is_empty() { String::new() } else { format!(": the numbers fit materials in {fitting}") };
     format!(
-        "state the units with --units LENGTH,MASS,TIME, or [model.units] in the manifest{reason}; use --allow-implausible (or allow_implausible in [model]) if m, kg, s are intended"
+        "state the units with --units LENGTH,MASS,TIME, or [model.units] in the manifest{reason}; use {} if m, kg, s are intended",
+        acceptance(Code::DensityImplausible)
     )
 }

@@ -1,6 +1,7 @@
 //! Pairs of nodes coupled by each matrix. An element that gives two nodes common mass couples them by its
 //! stiffness too.
 
+use crate::accepted::acceptance;
 use crate::fe_model::assemble::Assembled;
 use crate::rows::Rows;
 use crate::rows::neighbours::neighbours;
@@ -88,7 +89,7 @@ pub(crate) fn check_mass_pairs(
         foreign.len()
     );
     let report = |code| Diagnostic::new(code, message.as_str()).in_file(&origin.mass.path);
-    if origin.allow_implausible {
+    if origin.allow_implausible.accepts(Code::MassOrder) {
         diagnostics.push(report(Code::MassPairs));
     } else if let Some(order) = other_order(body) {
         diagnostics.push(report(Code::MassOrder).with_help(order));
@@ -96,7 +97,10 @@ pub(crate) fn check_mass_pairs(
         let help = "nothing to do if the model has a mass element or a mass spread over nodes: each of these nodes shares mass with each other";
         diagnostics.push(report(Code::MassPairs).with_help(help));
     } else if diagnostics.iter().any(|note| note.code() == Code::DeckConstrained) {
-        let help = "give the points with mass that follow others (RBE3, MPC) rows of their own, tied by RBE2 or stiff beams: the mass of a dependent point lies on all points that it follows, and the part of it that rotations of the point move does not turn with these points; --allow-implausible (or allow_implausible in [model]) accepts errors of W2 and W3 by it";
+        let help = format!(
+            "give the points with mass that follow others (RBE3, MPC) rows of their own, tied by RBE2 or stiff beams: the mass of a dependent point lies on all points that it follows, and the part of it that rotations of the point move does not turn with these points; {} accepts errors of W2 and W3 by it",
+            acceptance(Code::MassOrder)
+        );
         diagnostics.push(report(Code::MassOrder).with_help(help));
     } else {
         diagnostics.push(report(Code::MassOrder));

@@ -1,7 +1,9 @@
 //! Checks that K leaves rigid motion free and that M gives it the inertia of a body, and diagnosis of wrong
 //! labels if not.
 
+use crate::accepted::acceptance;
 use crate::checks::ground::ground_springs;
+use crate::checks::strained::Strained;
 use crate::fe_model::assemble::Assembled;
 use crate::rows::{Recovered, Rows, centre_and_length, rigid_count, rigid_fields, rigid_residuals};
 use crate::wording::name_some;
@@ -30,35 +32,7 @@ pub(crate) fn check_rigid_motion(
     let worst = largest(residuals.iter().copied());
     let ground = ground_springs(body);
     if worst.is_nan() || worst > limit {
-        let mut strained: Vec<usize> =
-            (0..residuals.len()).filter(|&i| residuals[i].is_nan() || residuals[i] > limit).collect();
-        sort_descending(&mut strained, |&i| residuals[i]);
-        let named: Vec<String> =
-            strained.iter().map(|&i| format!("{} ({:.1e})", rows.label(nodes, i), residuals[i])).collect();
-        let message = format!(
-            "K R is not zero for {} of {} rows: |K R| reaches {worst:.1e} of the row sum of |K| (allowed {limit:.0e}); worst: {}",
-            strained.len(),
-            residuals.len(),
-            name_some(&named)
-        );
-        let help = match (mislabelled(body, limit), ground) {
-            (Some(help), _) => help,
-            (None, _) if is_stressed(body, &fields, &strained, limit) => {
-                "write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]: at these nodes K resists rotations but not translations, so that it contains the stress of a preload (pretension of a member, contact, pressure)"
-            }
-            (None, Some(ground)) if strained.len() * 2 < residuals.len() => {
-                diagnostics.push(ground);
-                return worst;
-            }
-            (None, None) if strained.len() * 2 < residuals.len() => {
-                "export the free body: these degrees of freedom are supported or tied to ground"
-            }
-            (None, _) => {
-                "check units and order of the coordinates, and the labels of rotations: nearly all rows fail"
-            }
-        };
-        let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
-        diagnostics.push(diagnostic.in_file(&origin.stiffness.path).with_help(help));
+        report_strained(&Strained::new(body, &fields, &residuals, limit), ground, diagnostics);
     } else if ground.is_some() {
         diagnostics.extend(ground);
     } else if worst > rounded {
@@ -68,6 +42,66 @@ pub(crate) fn check_rigid_motion(
         diagnostics.push(Diagnostic::new(Code::NodesRounded, message).in_file(&origin.nodes_path));
     }
     worst
+}
+
+/// Adds the error for rigid motions that strain the body, with its cause: translations need no coordinates, so that
+/// rows that resist them are supported or wrongly labelled; rotations alone strain a body whose coordinates or labels are
+/// wrong, or a stiffness that does not follow rotations exactly, which the user may accept.
+fn report_strained(strained: &Strained<'_>, ground: Option<Diagnostic>, diagnostics: &mut Vec<Diagnostic>) {
+    let body = strained.body;
+    let origin = &body.origin;
+    let are_few = strained.rows.len() * 2 < strained.residuals.len();
+    let known = mislabelled(body, strained.limit).map(str::to_owned).or_else(|| {
+        let is_stressed = is_stressed(body, strained.fields, &strained.rows, strained.limit);
+        is_stressed.then(|| "write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]: at these nodes K resists rotations but not translations, so that it contains the stress of a preload (pretension of a member, contact, pressure)".to_owned())
+    });
+    if let Some(ground) = ground {
+        diagnostics.push(ground);
+        if known.is_none() && are_few {
+            return;
+        }
+    }
+    let mut error = Diagnostic::new(Code::RigidMotionStrained, strained.message());
+    let help = match (known, are_few) {
+        (Some(help), _) => help,
+        (None, true) if strained.by_translations => {
+            "export the free body: these degrees of freedom are supported or tied to ground, since translations strain them, which need no coordinates".to_owned()
+        }
+        (None, false) if strained.by_translations => {
+            "check the order and the labels of the rows, and that K is the stiffness of a free body: nearly all rows resist translations, which need no coordinates".to_owned()
+        }
+        _ => match strained.exchanged() {
+            Some([first, second]) => format!(
+                "exchange the coordinates of nodes {first} and {second}: with these exchanged, K leaves rigid motion free"
+            ),
+            None if strained.may_be_accepted() && origin.allow_implausible.accepts(Code::RigidMotionStrained) => {
+                let message = format!("{}; accepted", strained.message());
+                diagnostics.push(Diagnostic::new(Code::NodesRounded, message).in_file(&origin.stiffness.path).with_help(
+                    "nothing to do if the frequencies of the rigid body lie far below that of the first mode, which is checked with the modes",
+                ));
+                return;
+            }
+            None => rotations_alone(strained, are_few),
+        },
+    };
+    error = error.in_file(&origin.stiffness.path).with_help(help);
+    diagnostics.push(error);
+}
+
+/// Returns advice for a stiffness that only rotations strain.
+fn rotations_alone(strained: &Strained<'_>, are_few: bool) -> String {
+    let at = if are_few { "of these nodes" } else { "of all nodes" };
+    let check = format!(
+        "check unit, order and digits of the coordinates {at}, and the labels of rotations: translations, which need no coordinates, do not strain K, so that nothing supports it"
+    );
+    if !strained.may_be_accepted() {
+        return check;
+    }
+    format!(
+        "{check}; if the elements of K do not follow rotations exactly (warped shells, offsets), compare {} of the rigid body with the first mode, and use {}",
+        strained.highest_frequency().map_or("the frequencies".to_owned(), |hertz| format!("{hertz} Hz")),
+        acceptance(Code::RigidMotionStrained)
+    )
 }
 
 /// Returns true if K leaves translations free, and rotations (angle theta about each axis) cause forces

@@ -13,13 +13,13 @@ use crate::rounding::rounding;
 use crate::rows::{extents, rigid_count};
 use crate::wording::name_some;
 use crate::{
-    Damping, DofLabel, GeometricStiffness, GivenRows, ModelData, Nodes, RawMatrix, RawModel, Rows,
-    SoftRotations, SurfaceMesh,
+    Damping, DependentRow, DofLabel, GeometricStiffness, GivenRows, ModelData, NodeSet, Nodes, RawMatrix,
+    RawModel, Rows, SoftRotations, SurfaceMesh,
 };
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, parallel};
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -176,7 +176,30 @@ fn check_members(raw: &RawModel, nodes: &Nodes, diagnostics: &mut Vec<Diagnostic
                 diagnostics.push(Diagnostic::new(Code::InterfaceNode, message));
             }
         }
+        diagnostics.extend(refuse_dependent_members(set, raw.given_rows.dependent()));
     }
+}
+
+/// Returns an error for an interface with nodes that follow others by constraints: a load on such a node acts on the
+/// nodes that it follows, and a motion of the node is theirs.
+fn refuse_dependent_members(set: &NodeSet, dependent: &[DependentRow]) -> Option<Diagnostic> {
+    let members: HashSet<i64> = set.nodes.iter().copied().collect();
+    let of_members: Vec<&DependentRow> =
+        dependent.iter().filter(|row| members.contains(&row.label.node)).collect();
+    let sorted = |nodes: &mut dyn Iterator<Item = i64>| nodes.collect::<BTreeSet<i64>>();
+    let nodes = sorted(&mut of_members.iter().map(|row| row.label.node));
+    let leaders = sorted(&mut of_members.iter().flat_map(|row| &row.leaders).map(|label| label.node));
+    let [nodes, leaders] = [nodes, leaders].map(|nodes| nodes.into_iter().collect::<Vec<i64>>());
+    (!nodes.is_empty()).then(|| {
+        let message = format!(
+            "interface `{}` names {} nodes with directions that follow other nodes by constraints of the deck: {}",
+            set.name,
+            nodes.len(),
+            name_some(&nodes)
+        );
+        let help = format!("name the nodes that they follow instead: {}", name_some(&leaders));
+        Diagnostic::new(Code::InterfaceNode, message).with_help(help)
+    })
 }
 
 /// Conversion of the matrices of a model to the internal order, one after the other: each is released

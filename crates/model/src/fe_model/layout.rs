@@ -317,6 +317,10 @@ impl Occupied {
             let mut diagnostic = Diagnostic::new(Code::DofIncomplete, message).in_file(&raw.dofs_path);
             if sorted.used.is_empty() && incomplete.iter().all(|label| label.direction == 3) {
                 diagnostic = diagnostic.with_help("for a plane model, set `dimension = 2` (--dimension 2)");
+            } else if sorted.used.is_empty() && has_one_direction(placed) {
+                diagnostic = diagnostic.with_help(
+                    "give the rows of all displacements: all rows have one direction, as those of a torsional or axial chain, which has no inertia about other axes and is no body in space or in a plane",
+                );
             }
             diagnostics.push(diagnostic);
         }
@@ -338,6 +342,12 @@ impl Occupied {
             diagnostics.push(Diagnostic::new(Code::NodesUnused, message).in_file(&raw.nodes_path));
         }
     }
+}
+
+/// Returns true if all rows of the nodes have the same direction.
+fn has_one_direction(placed: &[[u32; 6]]) -> bool {
+    let with_rows = (0..6).filter(|&k| placed.iter().any(|rows| rows[k] != MISSING_ROW));
+    with_rows.count() == 1
 }
 
 /// Returns the internal order: displacements of the used nodes, vectors without a position, rotations,

@@ -1,6 +1,6 @@
 //! Properties of the files of a model that its checks use.
 
-use crate::{GeometricStiffness, RawMatrix, RawModel};
+use crate::{Accepted, GeometricStiffness, RawMatrix, RawModel};
 use std::path::PathBuf;
 
 /// Files of a model, for messages, with the digits of their numbers, for tolerances.
@@ -14,8 +14,8 @@ pub(crate) struct Origin {
     pub geometric_stiffness: Vec<GeometricStiffness<MatrixOrigin>>,
     /// Path of the file of the node table; empty for data in memory.
     pub nodes_path: PathBuf,
-    /// True if findings that the user has accepted are warnings: see [`RawModel`].
-    pub allow_implausible: bool,
+    /// Checks whose findings are warnings: see [`RawModel`].
+    pub allow_implausible: Accepted,
 }
 
 /// File of a matrix.

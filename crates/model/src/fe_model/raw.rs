@@ -1,7 +1,7 @@
 //! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
 use crate::raw_matrix::RawMatrix;
-use crate::{Description, DofLabel, GivenRows, ModelData, Nodes, RawFollowers};
+use crate::{Accepted, Description, DofLabel, GivenRows, ModelData, Nodes, RawFollowers};
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::SourceFile;
@@ -66,9 +66,8 @@ pub struct RawModel {
     pub given_rows: GivenRows,
     /// Points with mass that follow several nodes by constraints which the reader eliminated.
     pub followers: Option<RawFollowers>,
-    /// True if findings that the user has accepted are warnings instead of errors: implausible densities,
-    /// and mass coupling without stiffness.
-    pub allow_implausible: bool,
+    /// Checks whose findings are warnings instead of errors because the user accepted them.
+    pub allow_implausible: Accepted,
     /// True if soft rotations, to which only elements that are not quite coplanar give a stiffness, stay as K
     /// has them instead of following their elements.
     pub keep_soft_rotations: bool,
@@ -93,7 +92,7 @@ impl RawModel {
             dofs_path: PathBuf::new(),
             given_rows: GivenRows::default(),
             followers: None,
-            allow_implausible: false,
+            allow_implausible: Accepted::default(),
             keep_soft_rotations: false,
             diagnostics: Vec::new(),
         }

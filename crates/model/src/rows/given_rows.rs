@@ -1,5 +1,5 @@
 //! Maps from the rows of files to the rows of the model if they differ: turned from the axes of nodes to
-//! those of the model, without dependent rows, without empty rows.
+//! those of the model, without dependent rows, without empty rows, with dependent rows of nodes that have other rows.
 
 use crate::DofLabel;
 use faer::Mat;
@@ -17,6 +17,19 @@ const MAX_FOREIGN_ENTRY: f64 = 1e-12;
 pub struct GivenRows {
     maps: Vec<RowMap>,
     axes: HashMap<i64, NodeAxes>,
+    dependent: Vec<DependentRow>,
+}
+
+/// Row without mass that a constraint of the FE program makes the sum of others: `terms` are rows of K and M as read,
+/// with their factors. K holds it there by a spring, which no motion of the model strains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DependentRow {
+    /// Node and direction of the row.
+    pub label: DofLabel,
+    /// Rows that it follows, and their factors.
+    pub terms: Vec<(u32, f64)>,
+    /// Labels of these rows.
+    pub leaders: Vec<DofLabel>,
 }
 
 /// Map from the rows of a file to those of the model: x_file = T x.
@@ -41,6 +54,40 @@ impl RowMap {
         let shape = |matrix: &CscMatrix| (matrix.n_rows(), matrix.n_cols());
         assert_eq!(shape(&follows), shape(&picks), "shapes of a map of rows");
         Self { follows, picks, kept }
+    }
+
+    /// Returns the map of files without any of the dependent rows: all `n` rows of the model in their order.
+    fn identity(n: usize) -> Self {
+        let entries: Vec<(u32, u32, f64)> = (0..n as u32).map(|row| (row, row, 1.0)).collect();
+        let all = CscMatrix::from_triplets(n, n, &entries);
+        Self::new(all.clone(), all, (0..n as u32).collect())
+    }
+
+    /// Returns the map to a model that has `dependent` rows after all others. Matrices and forces of the file have no
+    /// part in them; their motion is the sum of the motions that they follow.
+    fn with_dependent(&self, dependent: &[DependentRow]) -> Self {
+        let (all, n_given) = (self.follows.n_rows(), self.follows.n_cols());
+        let mut followers: HashMap<u32, Vec<(u32, f64)>> = HashMap::new();
+        for (row, dependent) in (all as u32..).zip(dependent) {
+            for &(term, factor) in &dependent.terms {
+                followers.entry(self.kept[term as usize]).or_default().push((row, factor));
+            }
+        }
+        let extended = |matrix: &CscMatrix, with_sums: bool| {
+            let mut entries = Vec::with_capacity(matrix.nnz());
+            for given in 0..n_given {
+                let (rows, values) = matrix.column(given);
+                for (&row, &value) in rows.iter().zip(values) {
+                    entries.push((row, given as u32, value));
+                    let sums = followers.get(&row).filter(|_| with_sums).into_iter().flatten();
+                    entries.extend(sums.map(|&(to, factor)| (to, given as u32, factor * value)));
+                }
+            }
+            CscMatrix::from_triplets(all + dependent.len(), n_given, &entries)
+        };
+        let added = all as u32..(all + dependent.len()) as u32;
+        let kept = self.kept.iter().copied().chain(added).collect();
+        Self::new(extended(&self.follows, false), extended(&self.picks, true), kept)
     }
 
     /// Returns the number of rows of the file.
@@ -125,7 +172,22 @@ impl GivenRows {
     /// nodes whose results are along axes of their own. If two maps have one number of rows, the first
     /// counts.
     pub fn new(maps: Vec<RowMap>, axes: HashMap<i64, NodeAxes>) -> Self {
-        Self { maps, axes }
+        Self { maps, axes, dependent: Vec::new() }
+    }
+
+    /// Returns the maps to a model that has `dependent` rows after its other `n` rows.
+    pub fn with_dependent(mut self, n: usize, dependent: Vec<DependentRow>) -> Self {
+        if self.map(n).is_none() {
+            self.maps.push(RowMap::identity(n));
+        }
+        self.maps = self.maps.iter().map(|map| map.with_dependent(&dependent)).collect();
+        self.dependent = dependent;
+        self
+    }
+
+    /// Returns the rows of the model that follow others by constraints.
+    pub fn dependent(&self) -> &[DependentRow] {
+        &self.dependent
     }
 
     /// Returns the numbers of rows, besides that of the model, that files may have.
@@ -225,6 +287,6 @@ impl GivenRows {
 
     /// Returns only the axes of nodes, for a part of the model: no file has the rows of a part.
     pub(crate) fn of_body(&self) -> Self {
-        Self { maps: Vec::new(), axes: self.axes.clone() }
+        Self { axes: self.axes.clone(), ..Self::default() }
     }
 }

@@ -43,7 +43,7 @@ fn block(shared: impl Fn(usize, usize, usize) -> f64) -> RawModel {
     RawModel {
         dofs: Some(labels.collect()),
         // The mass couples what the stiffness does not.
-        allow_implausible: true,
+        allow_implausible: true.into(),
         ..RawModel::in_memory("block", stiffness, mass, plain.nodes.clone())
     }
 }

@@ -4,6 +4,7 @@
 
 mod assembler;
 mod internal_rows;
+mod strained;
 mod stress_components;
 mod stress_relations;
 mod uniform_strains;

@@ -143,7 +143,7 @@ fn wrong_stresses_are_refused_with_the_components_that_differ() {
     assert!(said(in_unit("slug/in/s^2")).is_empty());
     // The user may mean it.
     let mut raw = mapped(steel(&bracket(ElementKind::Hex8)), &scaled(0..6, 2.5));
-    raw.allow_implausible = true;
+    raw.allow_implausible = true.into();
     assert!(said(raw).iter().all(|diagnostic| diagnostic.code() == Code::RecoveryScale));
 }
 

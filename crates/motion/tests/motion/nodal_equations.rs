@@ -331,7 +331,7 @@ fn real_models_have_the_reduced_equations() {
             .expect("no units");
         let dimension = if name == "i_plane_stress" { 2 } else { 3 };
         // Some models are in mm, t, s without stating it; the numbers are not affected.
-        let files = ModelFiles { dimension, allow_implausible: true, ..files };
+        let files = ModelFiles { dimension, allow_implausible: true.into(), ..files };
         assert_projection(name, read_model(&files).expect("readable"));
     }
 }

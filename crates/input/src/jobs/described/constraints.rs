@@ -49,7 +49,7 @@ pub(super) struct Constraints<'d> {
 ///
 /// # Errors
 /// FB110 for cards that cannot be read.
-pub(super) fn constraints(
+pub(in super::super) fn constraints(
     deck: &Deck,
     mesh: &DeckMesh,
     rows: &Rows<'_>,

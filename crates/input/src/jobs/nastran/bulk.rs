@@ -46,6 +46,8 @@ pub(super) struct Bulk {
     /// True after PARAM,COUPMASS.
     pub coupled_mass: bool,
     pub has_elements: bool,
+    /// Number of damping elements.
+    pub n_dampers: usize,
     /// Elements for drawing.
     pub elements: Elements,
     /// True if an element has more than displacements.
@@ -296,6 +298,7 @@ impl Bulk {
 
     fn element(&mut self, card: &Card) {
         let name = card.name.as_str();
+        self.n_dampers += usize::from(DAMPERS.iter().any(|head| name.starts_with(head)));
         let is_element = name.starts_with('C') && !NO_ELEMENTS.iter().any(|head| name.starts_with(head));
         if is_element {
             self.has_elements = true;
@@ -368,6 +371,9 @@ fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
     }
     Some(())
 }
+
+/// Elements that only damp.
+const DAMPERS: &[&str] = &["CDAMP", "CVISC"];
 
 /// Elements that are points or connect coincident points, and are not drawn: springs, masses, dampers, fasteners.
 const NOTHING_TO_DRAW: &[&str] =

@@ -138,6 +138,12 @@ impl Constraints {
         })
     }
 
+    /// Returns the active constraints of supported kinds.
+    pub(super) fn supported(&self) -> Vec<&Constraint> {
+        let is_supported = |of: &&Constraint| !matches!(of.relation, Relation::Unsupported { .. });
+        self.holding().filter(is_supported).collect()
+    }
+
     /// Returns the dependent and the independent points.
     pub(super) fn points(&self) -> (BTreeSet<Point>, BTreeSet<Point>) {
         let followers = self.holding().flat_map(Constraint::dependent).collect();

@@ -15,7 +15,7 @@ const SINGULAR: f64 = 1e-10;
 const MAX_NAMED: usize = 8;
 
 /// Point as a weighted sum of others.
-type Sum = Vec<(Point, f64)>;
+pub(super) type Sum = Vec<(Point, f64)>;
 
 /// Dependent points, each as a sum of independent points.
 pub(super) struct Followers {
@@ -132,6 +132,11 @@ impl Followers {
             }
         }
         free.into_iter().filter(|(_, factor)| *factor != 0.0).collect()
+    }
+
+    /// Returns the dependent points, each with the independent points that it is the sum of.
+    pub(super) fn sums(&self) -> &BTreeMap<Point, Sum> {
+        &self.sums
     }
 
     fn contains(&self, point: &Point) -> bool {

@@ -114,26 +114,26 @@ impl Matrices {
         })
     }
 
-    /// Returns the equations of the rows that follow others, along the axes of the model, and those that are not described:
-    /// a grid with axes of its own whose displacements, or rotations, do not all follow others.
-    pub(super) fn equations(&self, places: &GridPlaces<'_>) -> (Vec<Equation>, Vec<NotDescribed>) {
-        let Some((elimination, _)) = &self.followers else { return (Vec::new(), Vec::new()) };
-        let left: HashSet<Point> = elimination.points.iter().copied().collect();
+    /// Returns the equations of the components that follow others, along the axes of the model, and those that are not
+    /// described: a grid with axes of its own whose displacements, or rotations, do not all follow others. If the matrices
+    /// of the files contain the constraints already, they are those of the deck.
+    pub(super) fn equations(
+        &self,
+        bulk: &Bulk,
+        places: &GridPlaces<'_>,
+    ) -> (Vec<Equation>, Vec<NotDescribed>) {
+        let has: HashSet<Point> = self.labels.iter().map(|label| (label.node, label.direction)).collect();
+        let all = || Followers::new(&bulk.constraints.supported(), places).ok();
+        let open = followers(bulk, |point| has.contains(point), places).ok().flatten();
+        let Some(followers) = open.or_else(all) else { return Default::default() };
+        // Each term along the axes of the model.
         let mut sums: BTreeMap<Point, BTreeMap<Point, f64>> = BTreeMap::new();
-        for (column, label) in self.labels.iter().enumerate() {
-            let point = (label.node, label.direction);
-            if left.contains(&point) {
-                continue;
-            }
-            // Each term along the axes of the model.
-            let mut sum: BTreeMap<Point, f64> = BTreeMap::new();
-            let (rows, factors) = elimination.follows.column(column);
-            for (row, factor) in rows.iter().zip(factors) {
-                let leader = elimination.points[*row as usize];
+        for (point, terms) in followers.sums() {
+            let sum = sums.entry(*point).or_default();
+            for &(leader, factor) in terms {
                 along_model(leader, places)
                     .for_each(|(term, part)| *sum.entry(term).or_default() += part * factor);
             }
-            sums.insert(point, sum);
         }
         let (mut equations, mut open) = (Vec::new(), BTreeSet::new());
         for &(grid, component) in sums.keys() {
@@ -588,8 +588,14 @@ fn points_of_rows(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<Vec<
             return Ok(displacements);
         }
     }
+    let counted_rows: Vec<usize> = counted.iter().map(|(_, rows)| *rows).collect();
     let counted: Vec<String> = counted.into_iter().map(|(what, rows)| format!("{what} {rows}")).collect();
     let message = format!("matrix {name} has {n} rows, the deck gives other numbers: {}", counted.join(", "));
-    let help = "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name";
+    let is_reduced = counted_rows.iter().any(|count| n < *count) && !name.contains("GG");
+    let help = if is_reduced {
+        "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name; if AUTOSPC has removed rows without stiffness (rotations of solids, normals of shells), write PARAM,AUTOSPC,NO"
+    } else {
+        "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name"
+    };
     Err(Diagnostic::new(Code::DeckRows, message).in_file(path).with_help(help))
 }
