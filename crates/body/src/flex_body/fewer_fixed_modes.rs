@@ -10,7 +10,7 @@ use super::{Certificate, FixedInterface, FlexBody, InterfaceCoordinates, Interna
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_linalg::combine;
+use flexbody_linalg::{combine, dense_cholesky, solve_lower};
 use flexbody_model::GeometricStiffness;
 
 impl FlexBody {
@@ -73,7 +73,7 @@ impl FlexBody {
         if kept.len() == rows.len() {
             return Ok((self.clone(), Mat::identity(self.n_modes(), self.n_modes())));
         }
-        if kept.len() + self.n_modes() == rows.len() {
+        if rows.len() - kept.len() >= self.n_modes() {
             let message = "no mode is left: the only motions of the interfaces are those of the rigid body";
             return Err(refused(message.to_owned(), "keep one fixed-interface mode at least"));
         }
@@ -86,7 +86,11 @@ impl FlexBody {
         let mut parts = self.changed(&change, self.conditions().clone())?.into_parts();
         // The frame is the former one: what a change of frame loses is still known.
         let old = self.parts();
-        parts.recoveries = self.combined_recoveries(&change, &self.lost_flexibility(&constraint));
+        let Some(lost) = self.lost_flexibility(&constraint) else {
+            let message = "the amplitudes of the fixed-interface modes depend on each other in this body";
+            return Err(refused(message.to_owned(), "convert again with fewer fixed-interface modes"));
+        };
+        parts.recoveries = self.combined_recoveries(&change, &lost);
         parts.estimated_stiffness = old
             .estimated_stiffness
             .iter()
@@ -113,15 +117,16 @@ impl FlexBody {
 
     /// Returns the static flexibility (nf x nf) that the modes lose by B_D p = 0, with B_D = `constraint`: that of the
     /// complement Y = Lambda^-1 B_D' in the norm of K, Y (Y'Lambda Y)^-1 Y'.
-    fn lost_flexibility(&self, constraint: &Mat<f64>) -> Mat<f64> {
+    /// `None` if the rows of B_D depend on each other.
+    fn lost_flexibility(&self, constraint: &Mat<f64>) -> Option<Mat<f64>> {
         let stiffness = self.invariants().modal_stiffness();
         let complement = Mat::from_fn(constraint.ncols(), constraint.nrows(), |j, d| {
             constraint[(d, j)] / stiffness[(j, j)]
         });
         let gram = combine(constraint.as_ref(), complement.as_ref());
-        let lower = flexbody_linalg::dense_cholesky(gram).expect("amplitudes are independent coordinates");
-        let half = flexbody_linalg::solve_lower(&lower, &complement.transpose().to_owned());
-        flexbody_linalg::gram(half.as_ref(), half.as_ref())
+        let lower = dense_cholesky(gram)?;
+        let half = solve_lower(&lower, &complement.transpose().to_owned());
+        Some(flexbody_linalg::gram(half.as_ref(), half.as_ref()))
     }
 }
 

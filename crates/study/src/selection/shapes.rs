@@ -53,7 +53,14 @@ impl<'b> FixedInterfaceModes<'b> {
         let starts_modes = !scene.initial.modes.is_empty();
         let amplitudes = whole.fixed_interface_amplitudes().filter(|_| !starts_modes)?;
         let (shapes, eigenvalues) = (whole.fixed_interface_shapes()?, whole.fixed_interface_eigenvalues()?);
-        Some(Self { whole, scene, amplitudes, shapes, eigenvalues })
+        // A body without shapes of hardly any mass may have fewer modes than fixed-interface modes.
+        (eigenvalues.len() <= whole.n_modes()).then_some(Self {
+            whole,
+            scene,
+            amplitudes,
+            shapes,
+            eigenvalues,
+        })
     }
 
     /// Returns their number.
