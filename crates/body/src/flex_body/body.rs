@@ -323,14 +323,13 @@ impl FlexBody {
         self.parts.invariants.groups()
     }
 
-    /// Returns the part of the mass that turns with its nodes. Files of other programs do not state it.
+    /// Returns the part of the mass that turns with its nodes. Files of other programs whose nodes turn do not state it.
     fn turning(&self) -> Turning {
+        let may_turn = self.parts.source.is_foreign() && self.parts.modes.rotation.is_some();
         match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
             (Some(_), Some(_)) => Turning::Partial,
             (Some(_), None) => Turning::Whole,
-            (None, _) if self.parts.source.is_foreign() && self.parts.invariants.general().is_some() => {
-                Turning::Partial
-            }
+            (None, _) if may_turn && self.parts.invariants.general().is_some() => Turning::Partial,
             (None, _) => Turning::None,
         }
     }

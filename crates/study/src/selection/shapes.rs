@@ -5,7 +5,6 @@
 //! fixed-interface modes can: without them the response to loads at the interfaces is still that of statics.
 
 use super::situation::PointRows;
-use super::trial::ModeShare;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -23,6 +22,23 @@ pub enum Pool {
     Modes,
     /// Fixed-interface modes of a Craig-Bampton body, beside all motions of its interfaces.
     FixedInterface,
+}
+
+/// Contribution of a mode to the motion of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeShare {
+    /// Largest |q|.
+    pub amplitude: f64,
+    /// Largest deflection of a watched point (or of any node if none is watched) by this mode alone, relative to the
+    /// largest of all modes together.
+    pub deflection: f64,
+    /// Root of its largest elastic energy, relative to the largest of all modes together.
+    pub stress: f64,
+    /// Largest contribution to a recovery over its limit, without the part that static columns hold; `None` if no
+    /// recovery has a limit.
+    pub recovery: Option<f64>,
+    /// True if the mode is kept.
+    pub kept: bool,
 }
 
 /// Fixed-interface modes that a selection keeps.

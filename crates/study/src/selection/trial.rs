@@ -3,7 +3,7 @@
 use super::bounds::{Driven, ErrorBound, Variation};
 use super::dropped_terms::{DroppedTerms, torques_of_w3};
 use super::norms::Norms;
-use super::shapes::{FixedInterfaceModes, Pool};
+use super::shapes::{FixedInterfaceModes, ModeShare, Pool};
 use super::situation::{PointRows, Situation};
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -494,23 +494,6 @@ impl TrialRuns<'_> {
         };
         (0..self.body.n_modes()).map(share).collect()
     }
-}
-
-/// Contribution of a mode to the motion of a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModeShare {
-    /// Largest |q|.
-    pub amplitude: f64,
-    /// Largest deflection of a watched point (or of any node if none is watched) by this mode alone, relative to the
-    /// largest of all modes together.
-    pub deflection: f64,
-    /// Root of its largest elastic energy, relative to the largest of all modes together.
-    pub stress: f64,
-    /// Largest contribution to a recovery over its limit, without the part that static columns hold; `None` if no
-    /// recovery has a limit.
-    pub recovery: Option<f64>,
-    /// True if the mode is kept.
-    pub kept: bool,
 }
 
 /// Returns the multiplications of an evaluation of the equations of `body` with `groups`.
