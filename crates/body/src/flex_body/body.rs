@@ -323,17 +323,6 @@ impl FlexBody {
         self.parts.invariants.groups()
     }
 
-    /// Returns the part of the mass that turns with its nodes. Files of other programs whose nodes turn do not state it.
-    fn turning(&self) -> Turning {
-        let may_turn = self.parts.source.is_foreign() && self.parts.modes.rotation.is_some();
-        match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
-            (Some(_), Some(_)) => Turning::Partial,
-            (Some(_), None) => Turning::Whole,
-            (None, _) if may_turn && self.parts.invariants.general().is_some() => Turning::Partial,
-            (None, _) => Turning::None,
-        }
-    }
-
     /// Checks every identity that the file alone can fulfil (theory section 10), including those of the
     /// interface coordinates. `frame` is the intended body frame. The limits for a body with 32-bit arrays
     /// include their rounding.
@@ -346,9 +335,16 @@ impl FlexBody {
             eigenvalues: Some(&self.parts.modes.eigenvalue),
             eigenvalue_noise: self.parts.certificate.rigid_noise,
             eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
-            turning: self.turning(),
+            turning: match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
+                (None, _) => Turning::None,
+                (Some(_), Some(_)) => Turning::Partial,
+                (Some(_), None) => Turning::Whole,
+            },
         };
-        let checks = identities(&self.parts.invariants, &expected);
+        let mut checks = identities(&self.parts.invariants, &expected);
+        if self.parts.source.is_foreign() && self.parts.invariants.general().is_some() {
+            checks.iter_mut().for_each(allow_turning_nodes);
+        }
         // Rounding moves the eigenvalues of the largest Gram matrix by at most the number of its rows times
         // one rounding.
         let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
@@ -357,6 +353,20 @@ impl FlexBody {
         checks.extend(self.parts.interface_identities());
         checks.extend(self.parts.cross_checks());
         checks
+    }
+}
+
+/// Largest violation of an identity of points of mass, relative to the bounds of its terms, that nodes whose rotations carry
+/// mass explain: 1.4e-2 for a frame of consistent beams, three to each member, and less for finer ones. Exchanged blocks
+/// and wrong units reach 0.1 to 1.
+pub const MAX_TURNING_PART: f64 = 0.05;
+
+/// Allows for a mass that turns with its nodes, which files of other programs do not state, in the identity of a mass that
+/// does not.
+fn allow_turning_nodes(check: &mut IdentityCheck) {
+    if check.name == "velocity_gram_psd" {
+        check.limit = check.limit.max(MAX_TURNING_PART);
+        check.passed = check.value <= check.limit;
     }
 }
 

@@ -30,7 +30,7 @@ mod validate;
 
 pub use crate::basis::{FixedInterface, FreeEstimate, InterfaceCoordinates, Truncation};
 pub use crate::invariants::{Frame, TermGroup, TermGroups};
-pub use body::FlexBody;
+pub use body::{FlexBody, MAX_TURNING_PART};
 pub use carrier::Carrier;
 pub use flexbody_model::{
     Coupling, GeometricStiffness, LoadKind, Quantity, RecoveryRow, SurfaceMesh, UnitLoad,

@@ -7,9 +7,9 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    Certificate, FlexBody, Frame, GeometricStiffness, Interface, MassStructure, ModalChange, Modes, Parts,
-    ReferenceConditions, Source, Storage, TermDecision, TermGroup, diagonal_eigenvalues, diagonal_ratios,
-    reduced_residuals, rigid_motions,
+    Certificate, FlexBody, Frame, GeometricStiffness, Interface, MAX_TURNING_PART, MassStructure,
+    ModalChange, Modes, Parts, ReferenceConditions, Source, Storage, TermDecision, TermGroup,
+    diagonal_eigenvalues, diagonal_ratios, reduced_residuals, rigid_motions,
 };
 use flexbody_body::invariants::{
     BodyFrame, Expected, FrameChoice, IdentityCheck, Invariants, Numbered, Turning, identities,
@@ -179,11 +179,6 @@ impl ModalCoordinates {
         }
     }
 }
-
-/// Largest violation of an identity of points of mass, relative to the bounds of its terms, that nodes whose rotations carry
-/// mass explain: 1.4e-2 for a frame of consistent beams, three to each member, and less for finer ones. Exchanged blocks
-/// and wrong units reach 0.1 to 1.
-pub(crate) const MAX_TURNING_PART: f64 = 0.05;
 
 /// Returns the largest violation of an identity of points of mass by a body with node rotations, if nodes whose rotations
 /// carry mass [explain](MAX_TURNING_PART) it. Beams and shells have such nodes, and formats that derive all inertia from one
