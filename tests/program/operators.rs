@@ -43,6 +43,9 @@ fn operators_in_all_formats_give_the_same_bits() {
     assert!(expected[0].modes.norm_max() > 1.0 && expected[0].spin.norm_max() > 0.0);
     for operator in [
         "sparse.mtx",
+        "full.npz:/R",
+        "full.csv",
+        "rows.rua",
         "sparse.mat",
         "dense.mat:R",
         "dense.mat:/R",

@@ -5,7 +5,9 @@ mod file;
 mod members;
 mod values;
 
-pub(super) use arrays::{StoredArray, has_arrays_beside, read_array, read_stored_array};
+pub(super) use arrays::{
+    StoredArray, has_arrays_beside, is_array, read_array, read_stored_array, square_arrays,
+};
 pub(super) use file::{MAX_DEPTH, MAX_GROUPS, layout, opened};
 pub(super) use members::Members;
 pub(super) use values::{

@@ -5,6 +5,7 @@ pub(super) mod assemble;
 mod compressed;
 pub(super) mod coordinates;
 pub(super) mod dmig;
+mod harwell_boeing;
 #[cfg(feature = "hdf5")]
 pub(super) mod hdf5;
 #[cfg(not(feature = "hdf5"))]
@@ -16,6 +17,8 @@ pub(super) mod mat5;
 pub(super) mod matrix_market;
 pub(super) mod named_matrices;
 mod npy_matrix;
+pub(super) mod npz_archive;
+mod npz_full;
 pub(super) mod operator;
 pub(super) mod output4;
 pub(super) mod petsc;
@@ -23,12 +26,14 @@ mod reader;
 pub(super) mod recent;
 pub(super) mod rectangular;
 pub(super) mod scipy_npz;
+mod text_array;
 pub(super) mod turn;
 
 use dmig::DmigPunch;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::text::{Compression, InputFile};
+use harwell_boeing::HarwellBoeing;
 use hdf5::Hdf5;
 use mat5::Mat5;
 use matrix_market::MatrixMarket;
@@ -37,12 +42,13 @@ use output4::Output4;
 use petsc::Petsc;
 use scipy_npz::ScipyNpz;
 use std::path::Path;
+use text_array::TextArray;
 
 pub use reader::{ArraySource, HEAD, MatrixRole, MatrixSource, Reader};
 
 /// Every supported matrix format.
 pub const READERS: &[&dyn Reader] =
-    &[&MatrixMarket, &Hdf5, &ScipyNpz, &Npy, &Mat5, &Petsc, &Output4, &DmigPunch];
+    &[&MatrixMarket, &Hdf5, &ScipyNpz, &Npy, &Mat5, &Petsc, &Output4, &DmigPunch, &HarwellBoeing, &TextArray];
 
 /// Returns the reader for a file: by its content, else by its extension.
 ///
@@ -50,7 +56,7 @@ pub const READERS: &[&dyn Reader] =
 /// FB102 if neither determines the format, with the likely kind of the file.
 pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&'static dyn Reader> {
     let head = compression.head(file, HEAD);
-    let by_content = READERS.iter().find(|reader| reader.recognises(&head));
+    let by_content = recognised(file.path(), &head);
     let by_name = || {
         let extension = extension(file.path());
         READERS.iter().find(|reader| reader.extensions().contains(&extension.as_str()))
@@ -58,7 +64,7 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
     // A known foreign format is reported by name rather than parsed by its extension.
     let not_read = NOT_READ.iter().find(|(magic, ..)| head.starts_with(magic));
     match (by_content, not_read) {
-        (Some(reader), _) => Ok(*reader),
+        (Some(reader), _) => Ok(reader),
         (None, Some((_, what, help))) => {
             let message = format!("file is {what}");
             Err(Diagnostic::new(Code::FileFormatUnknown, message)
@@ -83,8 +89,16 @@ pub(super) fn with_reader<T>(
 ) -> Option<T> {
     let compression = Compression::of(file.bytes());
     let head = compression.head(file, HEAD);
-    let reader = READERS.iter().find(|reader| reader.recognises(&head))?;
-    read(*reader, &ArraySource { file, compression, head: &head, name })
+    let reader = recognised(file.path(), &head)?;
+    read(reader, &ArraySource { file, compression, head: &head, name })
+}
+
+/// Returns the reader that recognises the beginning of a file. Lines of numbers in a file that is named like Matrix Market
+/// are no plain array but a list whose head is missing.
+fn recognised(path: &Path, head: &[u8]) -> Option<&'static dyn Reader> {
+    let reader = *READERS.iter().find(|reader| reader.recognises(head))?;
+    let is_list = MatrixMarket.extensions().contains(&extension(path).as_str());
+    (reader.name() != TextArray.name() || !is_list).then_some(reader)
 }
 
 /// First bytes of known file formats that are not supported, with their kind and advice.

@@ -110,6 +110,12 @@ pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     Ok(data.chunks_exact(size).map(decode).collect())
 }
 
+/// Returns the extents that the header of an array states; `bytes` is the beginning of the array. `None` if there is no
+/// header.
+pub(super) fn announced_extents(bytes: &[u8]) -> Option<Vec<usize>> {
+    described(bytes).ok().map(|(header, _)| header.shape)
+}
+
 /// Returns the number of values that the header of an array announces; `bytes` is the beginning of the array.
 ///
 /// # Errors

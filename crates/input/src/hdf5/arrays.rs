@@ -53,6 +53,21 @@ fn array_of(numbers: &Numbers) -> Diagnosed<Array> {
     Ok(Array { rows, cols, row_major: true, values, digits: if single { 7 } else { 17 } })
 }
 
+/// Returns the paths of the square datasets of the file, breadth first.
+pub(crate) fn square_arrays(file: &File) -> Vec<String> {
+    let is_square = |group: &Group, name: &str| {
+        group.dataset(name).is_ok_and(|set| matches!(*set.shape().as_slice(), [n, m] if n == m && n > 1))
+    };
+    let square = arrays(file).into_iter().filter(|(group, _, name)| is_square(group, name));
+    square.map(|(_, path, name)| format!("{path}/{name}")).collect()
+}
+
+/// Returns true if `name` is a dataset with two extents.
+pub(crate) fn is_array(file: &File, name: &str) -> bool {
+    let wanted = name.trim_matches('/');
+    arrays(file).iter().any(|(_, path, name)| format!("{path}/{name}")[1..] == *wanted)
+}
+
 /// Returns true if the file has arrays with two extents outside the group `name`.
 pub(crate) fn has_arrays_beside(file: &File, name: &str) -> bool {
     arrays(file).iter().any(|(_, path, _)| path != name && !(path.is_empty() && name == "/"))

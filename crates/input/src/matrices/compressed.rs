@@ -1,7 +1,10 @@
 //! Complete arrays with the entries of a sparse matrix in binary files, with checks of each entry, made compressed
 //! columns.
 
-use super::assemble::{ColumnEntries, Entry, Sides, assemble_columns, undeclared_triangle};
+use super::assemble::{
+    ColumnEntries, Entry, Sides, assemble_columns, check_size, refuse_beyond_memory, undeclared_triangle,
+};
+use crate::array::Array;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::RawMatrix;
 use std::path::Path;
@@ -60,6 +63,23 @@ impl Full<'_> {
         };
         compressed.assemble(path)
     }
+}
+
+/// Builds the square matrix of an array with both triangles; `help` and `both_triangles` are those of [`Full`].
+///
+/// # Errors
+/// FB305 for an array that is not square, FB601; the errors of [`Full::assemble`].
+pub(super) fn assemble_array(
+    array: Array,
+    help: &'static str,
+    both_triangles: &'static str,
+    path: &Path,
+) -> Result<RawMatrix, Diagnostic> {
+    let Array { rows, cols, row_major, values, digits } = array;
+    let n = check_size(rows as u64, cols as u64, values.len() as u64)?;
+    refuse_beyond_memory(values.len() as u64)?;
+    let raw = Full { n, by_rows: row_major, value: &|k| values[k], help, both_triangles }.assemble(path)?;
+    Ok(RawMatrix { digits: digits.min(raw.digits), ..raw })
 }
 
 impl Compressed<'_> {

@@ -3,14 +3,15 @@
 mod group;
 
 use super::assemble::Entry;
+use super::compressed::assemble_array;
 use super::named_matrices::NamedMatrices;
 use super::operator::OperatorColumns;
 use super::reader::{ArraySource, MatrixRole, MatrixSource, Reader};
 use super::rectangular::Rectangular;
 use crate::array::Array;
 use crate::hdf5::{
-    MAX_DEPTH, MAX_GROUPS, Members, StoredArray, has_arrays_beside, layout, opened, read_array,
-    read_stored_array,
+    MAX_DEPTH, MAX_GROUPS, Members, StoredArray, has_arrays_beside, is_array, layout, opened, read_array,
+    read_stored_array, square_arrays,
 };
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -24,6 +25,10 @@ use hdf5_metno::{File, Group};
 pub(crate) struct Hdf5;
 
 const NAMES: NamedMatrices = NamedMatrices { holder: "group", file: "FILE.h5", matrices: "sparse matrices" };
+const FULL_NAMES: NamedMatrices =
+    NamedMatrices { holder: "dataset", file: "FILE.h5", matrices: "square datasets" };
+const FULL: &str = "write the matrix again, square and of real numbers";
+const BOTH_TRIANGLES: &str = "write both triangles: K + tril(K, -1)'";
 
 impl Reader for Hdf5 {
     fn name(&self) -> &'static str {
@@ -51,11 +56,16 @@ impl Reader for Hdf5 {
                 return Err(vec![Diagnostic::new(Code::FileFormatUnknown, message).with_help(help)]);
             }
             let file = opened(source.file)?;
-            let (name, group) = match source.group {
-                Some(name) => (name.to_owned(), named(&file, name)?),
-                None => search(&file, source.role)?,
-            };
-            group::read(&group, &name, source)
+            match source.group {
+                Some(name) => match named(&file, name)? {
+                    Place::Group(group) => group::read(&group, name, source),
+                    Place::Dataset(dataset) => read_full(source.file, &dataset),
+                },
+                None => match search(&file, source.role)? {
+                    (name, Place::Group(group)) => group::read(&group, &name, source),
+                    (_, Place::Dataset(dataset)) => read_full(source.file, &dataset),
+                },
+            }
         };
         read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
     }
@@ -85,7 +95,7 @@ fn read_rectangular(file: &InputFile, name: Option<&str>) -> Diagnosed<Rectangul
         Some((name, group)) => group::read_rectangular(group, name, file),
         None if wanted.is_none() && found.len() > 1 => {
             let message = format!("file holds {} sparse matrices; which is the operator?", found.len());
-            Err(vec![layout(message).with_help(listing(&found))])
+            Err(vec![layout(message).with_help(NAMES.listing(&names(&found)))])
         }
         None => dense(file, name),
     }
@@ -108,8 +118,36 @@ fn dense(file: &InputFile, name: Option<&str>) -> Diagnosed<Rectangular> {
     Rectangular { rows, columns, entries }.checked().map_err(|diagnostic| vec![diagnostic])
 }
 
+/// Place of a matrix in a file.
+enum Place {
+    /// Group with a sparse matrix.
+    Group(Group),
+    /// Path of a dataset with a full matrix.
+    Dataset(String),
+}
+
+/// Reads a full matrix. Its rows and columns need not be told apart: a symmetric one is its transpose.
+fn read_full(file: &InputFile, dataset: &str) -> Diagnosed<RawMatrix> {
+    let StoredArray { array, .. } = read_stored_array(file, Some(dataset))?;
+    assemble_array(array, FULL, BOTH_TRIANGLES, file.path()).map_err(|diagnostic| vec![diagnostic])
+}
+
+/// Returns the place of the matrix that the user named; fields of structs of MATLAB may follow a point instead of a `/`.
+fn named(file: &File, name: &str) -> Diagnosed<Place> {
+    let fields = name.replace('.', "/");
+    let as_written = named_path(file, name);
+    if as_written.is_err() && fields != name { named_path(file, &fields).or(as_written) } else { as_written }
+}
+
+fn named_path(file: &File, name: &str) -> Diagnosed<Place> {
+    if is_array(file, name) {
+        return Ok(Place::Dataset(name.to_owned()));
+    }
+    named_group(file, name).map(Place::Group)
+}
+
 /// Opens the group that the user named.
-fn named(file: &File, name: &str) -> Diagnosed<Group> {
+fn named_group(file: &File, name: &str) -> Diagnosed<Group> {
     let mut group = file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])?;
     for part in name.split('/').filter(|part| !part.is_empty()) {
         if Members::of(&group).is_elsewhere(part) {
@@ -122,24 +160,33 @@ fn named(file: &File, name: &str) -> Diagnosed<Group> {
         group = group.group(part).map_err(|_| {
             let what =
                 if group.dataset(part).is_ok() { "is a dataset, not a group" } else { "is not in the file" };
-            vec![layout(format!("group `{name}`: `{part}` {what}")).with_help(listing(&matrices(file)))]
+            vec![layout(format!("group `{name}`: `{part}` {what}")).with_help(listing(file))]
         })?;
     }
     if holds_matrix(&Members::of(&group)) {
         return Ok(group);
     }
     let message = format!("group `{name}` holds no sparse matrix");
-    Err(vec![layout(message).with_help(listing(&matrices(file)))])
+    Err(vec![layout(message).with_help(listing(file))])
 }
 
-/// Returns the only matrix of the file, or the only one named after its role.
-fn search(file: &File, role: MatrixRole) -> Diagnosed<(String, Group)> {
+/// Returns the only sparse matrix of the file, or the only one named after its role; in a file without sparse matrices the
+/// only square dataset, or the one named after its role.
+fn search(file: &File, role: MatrixRole) -> Diagnosed<(String, Place)> {
     let mut found = matrices(file);
     if found.is_empty() {
-        return Err(vec![layout("file holds no sparse matrix".into())]);
+        let mut full = square_arrays(file);
+        if full.is_empty() {
+            return Err(vec![layout("file holds no sparse matrix".into())]);
+        }
+        let paths: Vec<&str> = full.iter().map(String::as_str).collect();
+        let chosen = FULL_NAMES.choose(&paths, role).map_err(|diagnostic| vec![diagnostic])?;
+        let path = full.swap_remove(chosen);
+        return Ok((path.clone(), Place::Dataset(path)));
     }
     let chosen = NAMES.choose(&names(&found), role).map_err(|diagnostic| vec![diagnostic])?;
-    Ok(found.swap_remove(chosen))
+    let (name, group) = found.swap_remove(chosen);
+    Ok((name, Place::Group(group)))
 }
 
 /// Returns names and groups of all sparse matrices of the file, breadth first.
@@ -177,6 +224,11 @@ fn names(found: &[(String, Group)]) -> Vec<&str> {
     found.iter().map(|(name, _)| name.as_str()).collect()
 }
 
-fn listing(found: &[(String, Group)]) -> String {
-    if found.is_empty() { Code::Hdf5Layout.help().to_owned() } else { NAMES.listing(&names(found)) }
+fn listing(file: &File) -> String {
+    let (found, full) = (matrices(file), square_arrays(file));
+    match (found.is_empty(), full.is_empty()) {
+        (false, _) => NAMES.listing(&names(&found)),
+        (true, false) => FULL_NAMES.listing(&full.iter().map(String::as_str).collect::<Vec<_>>()),
+        (true, true) => Code::Hdf5Layout.help().to_owned(),
+    }
 }

@@ -1,5 +1,5 @@
 //! Matrices in MAT-files of MATLAB, versions 5 to 7, as MATLAB, Octave and SciPy write them: "MAT-File Format", The
-//! MathWorks. Files of version 7.3 are HDF5.
+//! MathWorks. Fields of structs count as variables with a path. Files of version 7.3 are HDF5.
 
 use super::assemble::{Entry, check_extents, check_size, most_entries_of};
 use super::compressed::{Compressed, Full};
@@ -28,6 +28,11 @@ const MAX_REST_BYTES: u64 = 1 << 16;
 
 const NAMES: NamedMatrices = NamedMatrices { holder: "variable", file: "FILE.mat", matrices: "matrices" };
 const HELP: &str = "write it again: save('FILE.mat', 'K', 'M')";
+
+/// Largest depth of structs within structs.
+const MAX_DEPTH: usize = 8;
+/// Largest number of bytes of the names of the fields of a struct.
+const MAX_FIELD_NAMES_BYTES: u64 = 1 << 16;
 
 impl Reader for Mat5 {
     fn name(&self) -> &'static str {
@@ -87,15 +92,15 @@ fn read_rectangular(file: &InputFile, name: Option<&str>) -> Result<Rectangular,
             let is_matrix = |v: &&Variable<'_>| {
                 v.kind == VariableKind::Sparse || v.kind == VariableKind::Full && v.rows * v.columns > 1
             };
-            let candidates: Vec<&Variable<'_>> = variables.iter().filter(is_matrix).collect();
-            let names: Vec<String> = candidates.iter().map(|variable| variable.name.clone()).collect();
+            let candidates = outermost(variables.iter().filter(is_matrix).collect());
+            let names: Vec<String> = candidates.iter().map(|variable| variable.path.clone()).collect();
             candidates[named_or_only(&names, None)?]
         }
     };
     chosen.rectangular()?.checked()
 }
 
-/// Reads the heads of all variables of the file.
+/// Reads the heads of all variables of the file, and of the fields of structs.
 fn variables(bytes: &[u8], order: Order) -> Result<Vec<Variable<'_>>, Diagnostic> {
     let mut variables = Vec::new();
     let mut rest = &bytes[HEADER..];
@@ -108,8 +113,10 @@ fn variables(bytes: &[u8], order: Order) -> Result<Vec<Variable<'_>>, Diagnostic
         let [kind, length] = order.two(tag);
         let (body, after) = after.split_at_checked(length as usize).ok_or_else(cut_off)?;
         match kind {
-            MATRIX => variables.push(Variable::open(body, false, order)?),
-            COMPRESSED => variables.push(Variable::open(body, true, order)?),
+            MATRIX | COMPRESSED => {
+                let place = Place { body, compressed: kind == COMPRESSED, order, start: 0 };
+                Variable::open(&mut place.elements()?, place, "", &mut variables)?;
+            }
             // Elements of other kinds are skipped.
             _ => {}
         }
@@ -118,38 +125,59 @@ fn variables(bytes: &[u8], order: Order) -> Result<Vec<Variable<'_>>, Diagnostic
     Ok(variables)
 }
 
-/// Returns the variable that the user named.
+/// Returns the variable that the user named; fields of structs follow a point or a `/`.
 fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Result<&'v Variable<'a>, Diagnostic> {
-    let path = name.trim_matches('/');
-    let outer = path.split('/').next().unwrap_or(path);
-    let mut found = variables.iter().filter(|variable| variable.name == outer);
+    let path = name.trim_matches('/').replace('.', "/");
+    let outer = path.split('/').next().unwrap_or_default();
+    let mut found = variables.iter().filter(|variable| variable.path == path);
     match (found.next(), found.next()) {
-        (Some(variable), None) if outer == path => Ok(variable),
-        (Some(variable), None) => {
-            let message = format!("`{path}` is within the variable `{}`, which is not read", variable.name);
-            let help = format!("save its fields as variables: save('FILE.mat', '-struct', '{outer}')");
-            Err(Diagnostic::new(Code::Hdf5Layout, message).with_help(help))
-        }
+        (Some(variable), None) => Ok(variable),
         (Some(_), Some(_)) => {
-            let message = format!("file has several variables `{outer}`");
+            let message = format!("file has several variables `{path}`");
             Err(Diagnostic::new(Code::Hdf5Layout, message).with_help(HELP))
         }
         (None, _) => {
-            let message = format!("variable `{path}` is not in the file");
-            let paths = paths(variables);
-            let names: Vec<&str> = paths.iter().map(String::as_str).collect();
-            let help = if names.is_empty() { HELP.to_owned() } else { NAMES.listing(&names) };
+            let holder = variables.iter().find(|variable| variable.path == outer && outer != path);
+            let (message, help) = match holder {
+                Some(holder) if holder.kind != VariableKind::Struct => (
+                    format!("`{path}` is within the variable `{outer}`, which holds {}", holder.kind.words()),
+                    format!("save the matrix as a variable or as a field of one struct: {outer}.K = K"),
+                ),
+                _ => (format!("variable `{path}` is not in the file"), listing(variables)),
+            };
             Err(Diagnostic::new(Code::Hdf5Layout, message).with_help(help))
         }
     }
 }
 
+/// Returns the help that lists the variables of the file, with fields in place of their structs.
+fn listing(variables: &[Variable<'_>]) -> String {
+    let paths = paths(variables.iter().filter(|variable| variable.kind != VariableKind::Struct));
+    let names: Vec<&str> = paths.iter().map(String::as_str).collect();
+    if names.is_empty() { HELP.to_owned() } else { NAMES.listing(&names) }
+}
+
+/// Returns the candidates that are no fields of structs, or all if there are only fields.
+fn outermost<'v, 'a>(mut candidates: Vec<&'v Variable<'a>>) -> Vec<&'v Variable<'a>> {
+    if candidates.iter().any(|variable| !variable.is_field()) {
+        candidates.retain(|variable| !variable.is_field());
+    }
+    candidates
+}
+
 /// Returns the only sparse matrix, or the only one named after its role; in a file without sparse matrices, the only
-/// square full one or the one named after its role.
+/// square full one or the one named after its role. Fields of structs are considered if no variable is such a matrix.
 fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Result<&'v Variable<'a>, Diagnostic> {
-    let sparse: Vec<&Variable<'a>> = variables.iter().filter(|v| v.kind == VariableKind::Sparse).collect();
+    let is_sparse = |v: &&Variable<'a>| v.kind == VariableKind::Sparse;
     let is_full = |v: &&Variable<'a>| v.kind == VariableKind::Full && v.rows == v.columns && v.rows > 1;
-    let candidates = if sparse.is_empty() { variables.iter().filter(is_full).collect() } else { sparse };
+    let is_outer = |v: &&Variable<'a>| !v.is_field();
+    let candidates = [
+        variables.iter().filter(is_sparse).filter(is_outer).collect::<Vec<_>>(),
+        variables.iter().filter(is_full).filter(is_outer).collect(),
+        variables.iter().filter(is_sparse).collect(),
+        variables.iter().filter(is_full).collect(),
+    ];
+    let candidates = candidates.into_iter().find(|found| !found.is_empty()).unwrap_or_default();
     if candidates.is_empty() {
         let message = "file holds no sparse matrix and no square one";
         return Err(Diagnostic::new(Code::Hdf5Layout, message).with_help(HELP));
@@ -160,7 +188,7 @@ fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Result<&'v
 }
 
 fn paths<'v, 'a: 'v>(variables: impl IntoIterator<Item = &'v Variable<'a>>) -> Vec<String> {
-    variables.into_iter().map(|variable| format!("/{}", variable.name)).collect()
+    variables.into_iter().map(|variable| format!("/{}", variable.path)).collect()
 }
 
 // A variable of a MAT-file: its kind, and its matrix.
@@ -177,31 +205,70 @@ enum VariableKind {
     Sparse,
     /// Full array of real numbers with two extents.
     Full,
+    /// One struct, whose fields count as variables.
+    Struct,
     /// Content that is no matrix, in words.
     Other(&'static str),
 }
 
-/// Variable whose head has been read.
+impl VariableKind {
+    /// Returns the content in words.
+    fn words(self) -> &'static str {
+        match self {
+            Self::Sparse => "a sparse matrix",
+            Self::Full => "a full matrix",
+            Self::Struct => "a struct",
+            Self::Other(words) => words,
+        }
+    }
+}
+
+/// Place of a variable in its file.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    /// Body of the variable, or of that whose field it is.
+    body: &'a [u8],
+    compressed: bool,
+    order: Order,
+    /// Number of bytes before the elements of a field in the unpacked body; 0 for a variable.
+    start: u64,
+}
+
+impl<'a> Place<'a> {
+    /// Returns the elements of the variable.
+    fn elements(self) -> Result<Elements<'a>, Diagnostic> {
+        let mut elements = Elements::of(self.body, self.compressed, self.order)?;
+        elements.skip_to(self.start)?;
+        Ok(elements)
+    }
+}
+
+/// Variable, or field of a struct, whose head has been read.
 struct Variable<'a> {
-    pub name: String,
+    /// Names of the structs around it and its own, separated by `/`.
+    pub path: String,
     pub kind: VariableKind,
     pub rows: u64,
     pub columns: u64,
     single: bool,
     /// Kind of its values, if they are no real numbers.
     not_real: Option<&'static str>,
-    body: &'a [u8],
-    compressed: bool,
-    order: Order,
+    place: Place<'a>,
 }
 
 impl<'a> Variable<'a> {
-    /// Reads the head of the variable in `body`.
+    /// Reads the head of a variable, and those of its fields if it is a struct, into `variables`. `elements` begin at the
+    /// variable; `path` is that of a field, and empty for a variable, which has a name.
     ///
     /// # Errors
     /// FB103 for damaged packed bytes, FB301, FB304.
-    fn open(body: &'a [u8], compressed: bool, order: Order) -> Result<Self, Diagnostic> {
-        let [flags, extents, name] = Self::head(&mut Elements::of(body, compressed, order)?)?;
+    fn open(
+        elements: &mut Elements<'a>,
+        place: Place<'a>,
+        path: &str,
+        variables: &mut Vec<Self>,
+    ) -> Result<(), Diagnostic> {
+        let [flags, extents, name] = Self::head(elements)?;
         let flags = flags.whole(0).unwrap_or(0);
         let extent = |k: usize| extents.whole(k).and_then(|extent| u64::try_from(extent).ok()).unwrap_or(0);
         let kind = match (flags & 0xff, extents.len()) {
@@ -209,7 +276,8 @@ impl<'a> Variable<'a> {
             (6..=15, 2) => VariableKind::Full,
             (6..=15, _) => VariableKind::Other("an array of more than two extents"),
             (1, _) => VariableKind::Other("a cell array"),
-            (2, _) => VariableKind::Other("a struct"),
+            (2, 2) if extent(0) == 1 && extent(1) == 1 => VariableKind::Struct,
+            (2, _) => VariableKind::Other("an array of structs"),
             (4, _) => VariableKind::Other("a text"),
             _ => VariableKind::Other("an object"),
         };
@@ -218,17 +286,54 @@ impl<'a> Variable<'a> {
             flags if flags & 2 != 0 => Some("logical values"),
             _ => None,
         };
-        Ok(Self {
-            name: String::from_utf8_lossy(&name.bytes).into_owned(),
+        let name = String::from_utf8_lossy(&name.bytes);
+        let path = if path.is_empty() { name.into_owned() } else { path.to_owned() };
+        let structs = path.split('/').count();
+        variables.push(Self {
+            path: path.clone(),
             kind,
             rows: extent(0),
             columns: extent(1),
             single: flags & 0xff == 7,
             not_real,
-            body,
-            compressed,
-            order,
-        })
+            place,
+        });
+        if kind == VariableKind::Struct && structs <= MAX_DEPTH {
+            Self::open_fields(elements, place, &path, variables)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the heads of the fields of the struct `path`: the length of their names, the names, and a variable for each.
+    fn open_fields(
+        elements: &mut Elements<'a>,
+        place: Place<'a>,
+        path: &str,
+        variables: &mut Vec<Self>,
+    ) -> Result<(), Diagnostic> {
+        let length = elements.next(HEAD_BYTES)?.whole(0).and_then(|length| usize::try_from(length).ok());
+        let names = elements.next(MAX_FIELD_NAMES_BYTES)?;
+        let Some(length) = length.filter(|length| *length > 0) else {
+            let message = format!("struct `{path}` does not state how long the names of its fields are");
+            return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
+        };
+        for name in names.bytes.chunks_exact(length) {
+            let name = name.split(|byte| *byte == 0).next().unwrap_or_default();
+            let path = format!("{path}/{}", String::from_utf8_lossy(name));
+            let [kind, bytes] = elements.tag()?;
+            let end = elements.at.saturating_add(u64::from(bytes).next_multiple_of(8));
+            // An empty field has no elements.
+            if kind == MATRIX && bytes > 0 {
+                Self::open(elements, Place { start: elements.at, ..place }, &path, variables)?;
+            }
+            elements.skip_to(end)?;
+        }
+        Ok(())
+    }
+
+    /// Returns true for a field of a struct.
+    fn is_field(&self) -> bool {
+        self.place.start > 0
     }
 
     /// Reads flags, extents and name.
@@ -247,13 +352,15 @@ impl<'a> Variable<'a> {
     /// # Errors
     /// FB302 for a variable that is no matrix of real numbers, FB103.
     fn arrays(&self) -> Result<Arrays, Diagnostic> {
-        let mut elements = Elements::of(self.body, self.compressed, self.order)?;
+        let mut elements = self.place.elements()?;
         Self::head(&mut elements)?;
+        let refused = |what: &str, help: &str| {
+            let message = format!("variable `{}` holds {what}, not a matrix of real numbers", self.path);
+            Err(Diagnostic::new(Code::MatrixKind, message).with_help(help))
+        };
         let arrays = match (self.kind, self.not_real) {
-            (VariableKind::Other(what), _) | (_, Some(what)) => {
-                let message = format!("variable `{}` holds {what}, not a matrix of real numbers", self.name);
-                return Err(Diagnostic::new(Code::MatrixKind, message).with_help(REAL));
-            }
+            (VariableKind::Struct, _) => return refused("a struct", "name a field: FILE.mat:/struct.K"),
+            (VariableKind::Other(what), _) | (_, Some(what)) => return refused(what, REAL),
             (VariableKind::Sparse, None) => {
                 let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
                 let pointers = self.columns.saturating_add(1).saturating_mul(8);
@@ -264,7 +371,7 @@ impl<'a> Variable<'a> {
                 Arrays::Full(elements.next(places.saturating_mul(8))?)
             }
         };
-        elements.finish()?;
+        elements.finish(self.is_field())?;
         Ok(arrays)
     }
 
@@ -306,7 +413,7 @@ impl<'a> Variable<'a> {
             && starts[0] == 0
             && starts.last().is_some_and(|last| *last <= count as u64);
         if !fits {
-            let message = format!("variable `{}` has lists that do not fit each other", self.name);
+            let message = format!("variable `{}` has lists that do not fit each other", self.path);
             return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
         }
         let used = starts.last().copied().unwrap_or(0);
@@ -356,7 +463,7 @@ impl<'a> Variable<'a> {
         if self.rows.checked_mul(self.columns) != Some(values.len() as u64) {
             let (rows, columns, count) = (self.rows, self.columns, values.len());
             let message =
-                format!("variable `{}` has {rows} x {columns} places and {count} values", self.name);
+                format!("variable `{}` has {rows} x {columns} places and {count} values", self.path);
             return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
         }
         let n = check_size(self.rows, self.columns, values.len() as u64)?;
@@ -422,18 +529,38 @@ struct Elements<'a> {
     stream: Box<dyn Read + 'a>,
     order: Order,
     is_packed: bool,
+    /// Number of bytes that were read of the unpacked body.
+    at: u64,
+    /// Number of bytes that the unpacked body states to have.
+    length: u64,
 }
 
 impl<'a> Elements<'a> {
     /// Returns the elements in the body of a variable.
     fn of(body: &'a [u8], compressed: bool, order: Order) -> Result<Self, Diagnostic> {
-        let mut elements = Self { stream: Box::new(body), order, is_packed: compressed };
+        let length = body.len() as u64;
+        let mut elements = Self { stream: Box::new(body), order, is_packed: compressed, at: 0, length };
         if compressed {
             elements.stream = Box::new(flate2::read::ZlibDecoder::new(body));
             // Packed bytes hold a variable with its tag.
-            elements.take(8)?;
+            elements.length = u64::from(elements.tag()?[1]);
+            elements.at = 0;
         }
         Ok(elements)
+    }
+
+    /// Returns kind and number of bytes of the next element, whose bytes follow.
+    fn tag(&mut self) -> Result<[u32; 2], Diagnostic> {
+        let tag: [u8; 8] = self.take(8)?.try_into().expect("eight bytes were read");
+        Ok(self.order.two(&tag))
+    }
+
+    /// Skips the bytes before the byte `start` of the unpacked body; the last one may be missing, as padding may be.
+    fn skip_to(&mut self, start: u64) -> Result<(), Diagnostic> {
+        let count = start.min(self.length.saturating_add(8)).saturating_sub(self.at);
+        let mut skipped = self.stream.by_ref().take(count);
+        self.at += std::io::copy(&mut skipped, &mut std::io::sink()).map_err(damaged)?;
+        Ok(())
     }
 
     /// Returns the next element.
@@ -469,11 +596,14 @@ impl<'a> Elements<'a> {
         Ok(Numbers { kind, bytes, order: self.order })
     }
 
-    /// Reads to the end, where the checksum of packed bytes is verified.
+    /// Reads to the end, where the checksum of packed bytes is verified. Behind a field (`is_field`) further fields follow.
     ///
     /// # Errors
     /// FB103 for damaged packed bytes, FB304 if the packed bytes do not end soon.
-    fn finish(mut self) -> Result<(), Diagnostic> {
+    fn finish(mut self, is_field: bool) -> Result<(), Diagnostic> {
+        if is_field {
+            self.skip_to(self.length)?;
+        }
         let mut rest = self.stream.by_ref().take(MAX_REST_BYTES + 1);
         let count = std::io::copy(&mut rest, &mut std::io::sink()).map_err(damaged)?;
         if count <= MAX_REST_BYTES || !self.is_packed {
@@ -495,7 +625,7 @@ impl<'a> Elements<'a> {
     /// Returns the next `length` bytes, or fewer at the end.
     fn read(&mut self, length: u64) -> Result<Vec<u8>, Diagnostic> {
         let mut bytes = Vec::new();
-        self.stream.by_ref().take(length).read_to_end(&mut bytes).map_err(damaged)?;
+        self.at += self.stream.by_ref().take(length).read_to_end(&mut bytes).map_err(damaged)? as u64;
         Ok(bytes)
     }
 }

@@ -1,7 +1,6 @@
 //! Matrices stored in full as one array of NumPy (`numpy.save`).
 
-use super::assemble::{check_size, refuse_beyond_memory};
-use super::compressed::Full;
+use super::compressed::assemble_array;
 use super::reader::{ArraySource, MatrixSource, Reader};
 use crate::array::Array;
 use crate::npy;
@@ -43,11 +42,6 @@ impl Reader for Npy {
 }
 
 fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
-    let Array { rows, cols, row_major, values, digits } = npy::read(source.not_packed("NumPy array")?)?;
-    let n = check_size(rows as u64, cols as u64, values.len() as u64)?;
-    refuse_beyond_memory(values.len() as u64)?;
-    let full =
-        Full { n, by_rows: row_major, value: &|k| values[k], help: HELP, both_triangles: BOTH_TRIANGLES };
-    let raw = full.assemble(source.file.path())?;
-    Ok(RawMatrix { digits: digits.min(raw.digits), ..raw })
+    let array = npy::read(source.not_packed("NumPy array")?)?;
+    assemble_array(array, HELP, BOTH_TRIANGLES, source.file.path())
 }

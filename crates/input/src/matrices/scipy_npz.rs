@@ -1,32 +1,27 @@
-//! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
-//! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
+//! Archives of NumPy: sparse matrices of SciPy (`scipy.sparse.save_npz`), whose arrays are those of a matrix in CSC, CSR,
+//! COO or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>, and full arrays.
 
 use super::assemble::{
     Entry, StoredEntries, assemble, check_extents, check_size, push, refuse_beyond_memory,
     undeclared_triangle,
 };
 use super::compressed::{Compressed, EntryCheck};
+use super::npz_archive::Archive;
+use super::npz_full;
 use super::operator::OperatorColumns;
 use super::reader::{ArraySource, MatrixSource, Reader};
 use super::rectangular::Rectangular;
+use crate::array::Array;
 use crate::npy;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_model::RawMatrix;
-use std::io::{Cursor, Read};
 use std::path::Path;
-use zip::ZipArchive;
 
 /// Reader of SciPy's archives.
 pub(crate) struct ScipyNpz;
 
 const HELP: &str = "write it again: scipy.sparse.save_npz(file, A.tocsc())";
-const MEMORY_HELP: &str = "use a larger machine";
-
-/// Number of bytes of an array that are unpacked before its header is parsed: no header of NumPy is longer.
-const HEAD_BYTES: u64 = 1 << 17;
-
 const BOTH_TRIANGLES: &str = "save both triangles: A + scipy.sparse.tril(A, -1).T";
 
 impl Reader for ScipyNpz {
@@ -46,13 +41,39 @@ impl Reader for ScipyNpz {
     }
 
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
-        let read = source.has_one_matrix("an archive of SciPy").and_then(|()| read(source));
-        read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
+        let read = || {
+            let mut archive = Archive::open(source.not_packed("archive of NumPy")?)?;
+            if archive.is_sparse() {
+                source.has_one_matrix("an archive of SciPy")?;
+                read(archive, source.file.path())
+            } else {
+                npz_full::read(&mut archive, source)
+            }
+        };
+        read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
     }
 
     fn read_operator(&self, source: &ArraySource<'_>) -> Option<Diagnosed<OperatorColumns>> {
-        let read = || read_rectangular(source.file.bytes()).map(Rectangular::operator);
-        source.is_plain_of_one().then(|| read().map_err(|diagnostic| vec![diagnostic]))
+        if !source.is_plain_of_one() {
+            return None;
+        }
+        let read = match Archive::open(source.file.bytes()) {
+            Ok(archive) if !archive.is_sparse() => return None,
+            opened => opened.and_then(read_rectangular),
+        };
+        Some(read.map(Rectangular::operator).map_err(|diagnostic| vec![diagnostic]))
+    }
+
+    fn read_array(&self, source: &ArraySource<'_>) -> Option<Diagnosed<Array>> {
+        if !source.is_plain() {
+            return None;
+        }
+        let opened = source.file.load().and_then(|()| Archive::open(source.file.bytes()));
+        let read = match opened {
+            Ok(archive) if archive.is_sparse() => return None,
+            opened => opened.and_then(|mut archive| npz_full::read_array(&mut archive, source.name)),
+        };
+        Some(read.map_err(|diagnostic| vec![diagnostic]))
     }
 }
 
@@ -60,8 +81,7 @@ impl Reader for ScipyNpz {
 ///
 /// # Errors
 /// FB103, FB301 to FB306 for an archive that is not valid.
-fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic> {
-    let mut archive = Archive::open(bytes)?;
+fn read_rectangular(mut archive: Archive<'_>) -> std::result::Result<Rectangular, Diagnostic> {
     let form = archive.member("format").ok().and_then(|bytes| npy::read_word(&bytes)).unwrap_or_default();
     let shape = npy::read_integers(&archive.member("shape")?)?;
     let &[rows, columns] = shape.as_slice() else {
@@ -118,8 +138,7 @@ fn read_rectangular(bytes: &[u8]) -> std::result::Result<Rectangular, Diagnostic
     Rectangular { rows, columns, entries }.checked()
 }
 
-fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
-    let (mut archive, path) = (Archive::open(source.file.bytes())?, source.file.path());
+fn read(mut archive: Archive<'_>, path: &Path) -> std::result::Result<RawMatrix, Diagnostic> {
     let form = archive.member("format").ok().and_then(|bytes| npy::read_word(&bytes)).unwrap_or_default();
     let shape = npy::read_integers(&archive.member("shape")?)?;
     let &[rows, columns] = shape.as_slice() else {
@@ -253,59 +272,4 @@ fn same_length(values: &[f64], indices: &[i64], what: &str) -> std::result::Resu
     }
     let message = format!("{} values have {} {what}", values.len(), indices.len());
     Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
-}
-
-/// Archive of arrays of NumPy.
-pub(crate) struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
-
-impl<'a> Archive<'a> {
-    pub(crate) fn open(bytes: &'a [u8]) -> std::result::Result<Self, Diagnostic> {
-        ZipArchive::new(Cursor::new(bytes)).map(Self).map_err(|error| damaged(&error))
-    }
-
-    fn open_member(&mut self, name: &str) -> std::result::Result<impl Read + use<'_, 'a>, Diagnostic> {
-        self.0.by_name(&format!("{name}.npy")).map_err(|error| match error {
-            zip::result::ZipError::FileNotFound => {
-                let message = format!("archive has no array `{name}`: it is not a sparse matrix of SciPy");
-                Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
-            }
-            error => damaged(&error),
-        })
-    }
-
-    /// Returns the bytes of the array `name`, verified by its checksum.
-    pub(crate) fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
-        let mut member = self.open_member(name)?;
-        let mut bytes = Vec::new();
-        let mut take = |bytes: &mut Vec<u8>, most: u64| {
-            let more = most.saturating_sub(bytes.len() as u64);
-            member.by_ref().take(more).read_to_end(bytes).map_err(|error| damaged(&error)).map(|_| ())
-        };
-        take(&mut bytes, HEAD_BYTES)?;
-        // A member that is no array is refused by its beginning; of an array no more is unpacked than its header
-        // announces.
-        if let Some(announced) = npy::announced_bytes(&bytes) {
-            let refused =
-                refuse_beyond(left(), announced as f64, &format!("the array `{name}`"), MEMORY_HELP);
-            refused.map_err(|error| error.first_error().clone())?;
-            take(&mut bytes, announced.saturating_add(1))?;
-        }
-        Ok(bytes)
-    }
-
-    pub(crate) fn has(&self, name: &str) -> bool {
-        self.0.index_for_name(&format!("{name}.npy")).is_some()
-    }
-
-    /// Returns the number of values that the header of the array `name` announces.
-    fn count(&mut self, name: &str) -> std::result::Result<u64, Diagnostic> {
-        let mut member = self.open_member(name)?;
-        let mut bytes = Vec::new();
-        member.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(|error| damaged(&error))?;
-        npy::announced_values(&bytes)
-    }
-}
-
-fn damaged(error: &dyn std::fmt::Display) -> Diagnostic {
-    Diagnostic::new(Code::FileCompressionBroken, format!("archive is damaged: {error}")).with_help(HELP)
 }

@@ -178,7 +178,6 @@ fn variables_of_matlab_are_taken_by_role_or_by_name() {
     assert!(error.to_string().contains("named like the stiffness matrix"), "{error}");
     let many = fixture("matlab/octave_v7.mat");
     for (group, code, part) in [
-        ("/s/K", Code::Hdf5Layout, "within the variable `s`"),
         ("/s", Code::MatrixKind, "a struct"),
         ("/c", Code::MatrixKind, "a cell array"),
         ("/k", Code::Hdf5Layout, "not in the file"),
