@@ -202,7 +202,7 @@ mod tests {
                 b"%%MatrixMarket matrix coordinate real general\n2 3 2\n1 1 2\n".to_vec(),
                 Code::MatrixCount,
             ),
-            ("text.csv", b"1,2,3\n".to_vec(), Code::FileFormatUnknown),
+            ("text.csv", b"one,two\n".to_vec(), Code::FileFormatUnknown),
         ] {
             let found = read(name, &bytes).expect_err(name);
             assert_eq!(found[0].code(), code, "{name}: {}", found[0].message());

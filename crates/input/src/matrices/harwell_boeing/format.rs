@@ -169,7 +169,7 @@ mod tests {
         }
         assert!(Format::three(b"(16I5)          (16I5)").is_err());
         assert!(Format::three(b"(16I5)(16I5)((3E26.18)").is_err());
-        assert!(Format::three(b"(16I5)          (10I8)          (1P,(3E26.18))      ").is_err());
+        assert!(Format::three(b"(16I5)          (10I8)          (1P,(3E26.18))      ").is_ok());
     }
 
     #[test]
