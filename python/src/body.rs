@@ -642,8 +642,9 @@ impl Body {
 
     /// Returns the body with some of its modes (numbers from 1, ascending; all by default) and groups of terms: "W1", "W2",
     /// "W3" with commas, "none", "all", or those of a guideline: "I", "II", "III", "IV". `fixed_interface_modes` are the numbers
-    /// of those that a Craig-Bampton body keeps beside all motions of its interfaces; modes are then numbered anew. With `storage` "f32" its shapes and
-    /// the inertia of its modes are rounded to 32-bit floats. Like `flexbody reduce`.
+    /// of those that a Craig-Bampton body keeps beside all motions of its interfaces; `modes` refers to the modes of the body
+    /// that this leaves. With `storage` "f32" its shapes and the inertia of its modes are rounded to 32-bit floats. Like
+    /// `flexbody reduce`.
     #[pyo3(
         signature = (
             modes: "Sequence[int] | None" = None,

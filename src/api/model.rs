@@ -372,8 +372,7 @@ impl ModelBuilder {
     pub fn accept(mut self, codes: &str) -> Result<Self> {
         let accepted = Accepted::from_codes(codes).map_err(|code| {
             let message = format!("findings of the check `{code}` cannot be accepted");
-            let possible: Vec<&str> = Accepted::possible().collect();
-            Diagnostic::new(Code::Usage, message).with_help(format!("use one of {}", possible.join(", ")))
+            Diagnostic::new(Code::Usage, message).with_help(format!("use one of {}", Accepted::possible()))
         })?;
         self.raw.allow_implausible = self.raw.allow_implausible.and(accepted);
         Ok(self)

@@ -215,7 +215,7 @@ pub struct ReduceArguments {
     #[arg(long, value_name = "NUMBERS")]
     pub keep_modes: Option<String>,
     /// Numbers of the fixed-interface modes of a Craig-Bampton body to keep beside all motions of its interfaces: 1,3,5-9
-    /// or none [default: all]. Modes are then numbered anew
+    /// or none [default: all]. --keep-modes refers to the modes of the body that this leaves
     #[arg(long, value_name = "NUMBERS")]
     pub fixed_interface_modes: Option<String>,
     /// Groups of terms to keep: W1, W2, W3 with commas, none, all, or the groups of a guideline of Witteveen and
@@ -612,16 +612,15 @@ fn stress_loads(text: &str) -> Result<StressLoads, String> {
     StressLoads::parse(text).map_err(|name| format!("`{name}` is none of {names}, none"))
 }
 
-/// Parses a positive number.
 /// Reads the codes of accepted checks, or `all`.
 fn accepted(text: &str) -> Result<Accepted, String> {
     if text == "all" {
         return Ok(Accepted::from(true));
     }
-    let possible = || Accepted::possible().collect::<Vec<&str>>().join(", ");
-    Accepted::from_codes(text).map_err(|code| format!("`{code}` is none of {}", possible()))
+    Accepted::from_codes(text).map_err(|code| format!("`{code}` is none of {}", Accepted::possible()))
 }
 
+/// Parses a positive number.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

@@ -16,7 +16,7 @@ const MAX_RIGID_ROUNDING: f64 = 1e-8;
 /// Motion relative to the largest of the modes below which an interface counts as at rest, such as the interface that
 /// carries the frame: its nodes move by the rounding of the rigid motion that was taken from the modes, 1e-12 of their
 /// largest motion.
-const MAX_MOTION_AT_REST: f64 = 1e-3;
+const LARGEST_AT_REST: f64 = 1e-3;
 /// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
 const MAX_NORM_ROUNDING: f64 = 1e-9;
 /// Allowed rounding error between coordinates computed from the shapes in two ways.
@@ -97,9 +97,9 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     let rows =
         interface.rows(body.nodes(), modes.shape.as_ref(), rotation.map(Mat::as_ref), body.dimension());
     let Some(rows) = rows else { return f64::INFINITY };
-    let displaced = rows.deformation_beside(MAX_MOTION_AT_REST * modes.shape.norm_max());
+    let displaced = rows.deformation_beside(LARGEST_AT_REST * modes.shape.norm_max());
     let (Some(rotation), Some(turns)) = (rotation, &rows.rotation) else { return displaced };
-    let (mut left, mut size) = (0.0, larger(turns.norm_max(), MAX_MOTION_AT_REST * rotation.norm_max()));
+    let (mut left, mut size) = (0.0, larger(turns.norm_max(), LARGEST_AT_REST * rotation.norm_max()));
     for &node in &interface.nodes {
         for k in 0..3 {
             let row = rotation.as_ref().subrows(3 * node + k, 1);

@@ -18,6 +18,7 @@ mod job;
 mod knots;
 mod matrix_files;
 mod nastran;
+mod not_taken;
 mod siblings;
 mod transformed;
 

@@ -222,9 +222,7 @@ impl ManifestWalk<'_, '_> {
     fn accepted(&mut self, table: &TomlTable) -> Accepted {
         const KEY: &str = "allow_implausible";
         let Some(value) = table.get(KEY) else { return Accepted::default() };
-        let expected = || {
-            format!("true, false, or a list of {}", Accepted::possible().collect::<Vec<&str>>().join(", "))
-        };
+        let expected = || format!("true, false, or a list of {}", Accepted::possible());
         let DeValue::Array(list) = value.get_ref() else {
             if let DeValue::Boolean(all) = value.get_ref() {
                 return Accepted::from(*all);

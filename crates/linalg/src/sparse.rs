@@ -153,6 +153,14 @@ impl CscMatrix {
         (&self.row_idx[range.clone()], &self.values[range])
     }
 
+    /// Returns row, column and value of every stored entry, column by column.
+    pub fn triplets(&self) -> impl Iterator<Item = (u32, u32, f64)> + '_ {
+        (0..self.n_cols).flat_map(move |j| {
+            let (rows, values) = self.column(j);
+            rows.iter().zip(values).map(move |(&row, &value)| (row, j as u32, value))
+        })
+    }
+
     /// Returns the entry at (`row`, `col`); zero if it is not stored.
     pub fn get(&self, row: usize, col: usize) -> f64 {
         let (rows, values) = self.column(col);

@@ -31,14 +31,15 @@ impl Accepted {
         Ok(accepted)
     }
 
-    /// Returns the codes of all checks that may be accepted.
-    pub fn possible() -> impl Iterator<Item = &'static str> {
-        CHECKS.iter().map(|code| code.id())
+    /// Returns the codes of all checks that may be accepted, separated by commas.
+    pub fn possible() -> String {
+        CHECKS.map(Code::id).join(", ")
     }
 
     /// Returns the codes of the accepted checks.
     pub fn codes(self) -> Vec<&'static str> {
-        Self::possible().zip(self.checks).filter(|(_, accepted)| *accepted).map(|(code, _)| code).collect()
+        let accepted = CHECKS.into_iter().zip(self.checks).filter(|(_, is_accepted)| *is_accepted);
+        accepted.map(|(code, _)| code.id()).collect()
     }
 
     /// Returns true if the findings of the check with the code of its error are accepted.

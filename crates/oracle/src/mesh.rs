@@ -264,10 +264,7 @@ impl Assembly {
 
 /// Returns row, column and value of every stored entry, column by column.
 pub fn entries(matrix: &CscMatrix) -> impl Iterator<Item = (u32, u32, f64)> + '_ {
-    (0..matrix.n_cols()).flat_map(move |j| {
-        let (rows, values) = matrix.column(j);
-        rows.iter().zip(values).map(move |(&r, &v)| (r, j as u32, v))
-    })
+    matrix.triplets()
 }
 
 /// Returns the lower corners of the cells of a grid.

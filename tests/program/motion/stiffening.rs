@@ -245,7 +245,7 @@ fn other_stresses_and_matrices_without_stress_are_refused() {
     let manifest = fs::read_to_string(place.join("model.toml")).expect("a manifest");
     for (file, code, part) in [
         ("job.sti", "FB452", "matrix with stress is K itself: it was written without the stress"),
-        ("stiff_04.dof", "FB102", ""),
+        ("stiff_04.dof", "FB305", "one number on each line"),
     ] {
         let table = format!("[[geometric_stiffness]]\nwith_stress = \"{file}\"\nspin = \"xx\"\n");
         fs::write(place.join("wrong.toml"), format!("{manifest}{table}")).expect("written");

@@ -265,8 +265,12 @@ pub struct InterfaceCoordinates {
 impl InterfaceCoordinates {
     /// Returns the eigenvalues of the fixed-interface modes, K_jj / M_jj of their amplitudes. Unit: 1/time^2.
     pub fn fixed_interface_eigenvalues(&self) -> Vec<f64> {
-        let amplitudes = self.names.iter().enumerate().filter(|(_, name)| Self::is_amplitude(name));
-        amplitudes.map(|(j, _)| self.stiffness[(j, j)] / self.mass[(j, j)]).collect()
+        self.amplitudes().into_iter().map(|j| self.stiffness[(j, j)] / self.mass[(j, j)]).collect()
+    }
+
+    /// Returns the coordinates that are amplitudes of fixed-interface modes.
+    pub(crate) fn amplitudes(&self) -> Vec<usize> {
+        (0..self.names.len()).filter(|j| Self::is_amplitude(&self.names[*j])).collect()
     }
 
     /// Returns the name of the amplitude of the fixed-interface mode with this number, from 1.

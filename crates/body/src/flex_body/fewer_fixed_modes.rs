@@ -6,32 +6,33 @@
 //! body is that of a conversion with these fixed-interface modes alone.
 
 use super::modal_change::ModalChange;
-use super::{Certificate, FixedInterface, FlexBody, InterfaceCoordinates, InternalRows, Storage};
+use super::{Certificate, FixedInterface, FlexBody, InterfaceCoordinates, Storage};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_linalg::{combine, dense_cholesky, solve_lower};
-use flexbody_model::GeometricStiffness;
+use flexbody_linalg::{combine, dense_cholesky, gram, solve_lower};
 
 impl FlexBody {
+    /// Returns the interface coordinates of a Craig-Bampton body, and those that are amplitudes of fixed-interface modes;
+    /// `None` if the body has no interface coordinates.
+    fn fixed_interface_coordinates(&self) -> Option<(&InterfaceCoordinates, Vec<usize>)> {
+        let coordinates = self.coordinates().filter(|_| self.certificate().fixed_interface.is_some())?;
+        Some((coordinates, coordinates.amplitudes()))
+    }
+
     /// Returns the amplitudes eta of the fixed-interface modes in each mode (their number x nf); `None` if the body has no
     /// interface coordinates, or no fixed-interface modes.
     pub fn fixed_interface_amplitudes(&self) -> Option<Mat<f64>> {
-        let coordinates = self.coordinates()?;
-        let rows = amplitudes(coordinates);
-        (!rows.is_empty() && self.certificate().fixed_interface.is_some())
-            .then(|| picked(&coordinates.of_modes, &rows))
+        let (coordinates, amplitudes) = self.fixed_interface_coordinates()?;
+        (!amplitudes.is_empty()).then(|| picked(&coordinates.of_modes, &amplitudes))
     }
 
     /// Returns the deformation of each fixed-interface mode with amplitude 1 in the modes (nf x their number), relative to
-    /// the frame: B'M e. `None` as for [`FlexBody::fixed_interface_amplitudes`].
+    /// the frame: B'M e. `None` if the body has no interface coordinates.
     pub fn fixed_interface_shapes(&self) -> Option<Mat<f64>> {
-        let coordinates = self.coordinates()?;
-        let rows = amplitudes(coordinates);
-        let momenta = picked(&coordinates.mass, &rows);
-        (!rows.is_empty() && self.certificate().fixed_interface.is_some()).then(|| {
-            flexbody_linalg::gram(coordinates.of_modes.as_ref(), momenta.transpose().to_owned().as_ref())
-        })
+        let (coordinates, amplitudes) = self.fixed_interface_coordinates()?;
+        let momenta = picked(&coordinates.mass, &amplitudes);
+        Some(gram(coordinates.of_modes.as_ref(), momenta.transpose().to_owned().as_ref()))
     }
 
     /// Returns the body with the fixed-interface modes `kept` (indices, ascending) and all motions of its interfaces.
@@ -52,67 +53,35 @@ impl FlexBody {
     /// # Errors
     /// The errors of [`FlexBody::with_fixed_interface_modes`].
     pub fn fewer_fixed_interface_modes(&self, kept: &[usize]) -> Result<(Self, Mat<f64>)> {
-        let (Some(coordinates), Some(fixed)) =
-            (self.coordinates(), self.certificate().fixed_interface.as_ref())
-        else {
-            let message =
-                "the body has no interface coordinates, by which fixed-interface modes are told apart";
-            let help = "give a body of --basis craig-bampton with all its modes, with the frame at the centre of mass";
-            return Err(refused(message.to_owned(), help));
-        };
-        let rows = amplitudes(coordinates);
-        if kept.windows(2).any(|pair| pair[0] >= pair[1])
-            || kept.last().is_some_and(|last| *last >= rows.len())
-        {
-            let message = format!(
-                "a fixed-interface mode is asked for that is not among the {} of the body",
-                rows.len()
-            );
-            return Err(refused(message, "give ascending numbers from 1, as in 1,3,5-9, or none"));
-        }
-        if kept.len() == rows.len() {
+        let (coordinates, amplitudes) = self.fixed_interface_coordinates().ok_or_else(without_coordinates)?;
+        let dropped = dropped(&amplitudes, kept, self.n_modes())?;
+        if dropped.is_empty() {
             return Ok((self.clone(), Mat::identity(self.n_modes(), self.n_modes())));
         }
-        if rows.len() - kept.len() >= self.n_modes() {
-            let message = "no mode is left: the only motions of the interfaces are those of the rigid body";
-            return Err(refused(message.to_owned(), "keep one fixed-interface mode at least"));
-        }
-        let dropped: Vec<usize> =
-            (0..rows.len()).filter(|at| kept.binary_search(at).is_err()).map(|at| rows[at]).collect();
         let constraint = picked(&coordinates.of_modes, &dropped);
         let change = ModalChange::in_span(self.invariants(), &null_space(&constraint))
             .map_err(|reason| refused(reason, "keep more fixed-interface modes"))?;
+        let lost = self.lost_flexibility(&constraint).ok_or_else(|| {
+            let message = "the amplitudes of the fixed-interface modes depend on each other in this body";
+            refused(message.to_owned(), "convert again with fewer fixed-interface modes")
+        })?;
 
         let mut parts = self.changed(&change, self.conditions().clone())?.into_parts();
-        // The frame is the former one: what a change of frame loses is still known.
-        let old = self.parts();
-        let Some(lost) = self.lost_flexibility(&constraint) else {
-            let message = "the amplitudes of the fixed-interface modes depend on each other in this body";
-            return Err(refused(message.to_owned(), "convert again with fewer fixed-interface modes"));
-        };
+        // The frame is the former one, so that rows which rigid motion changes stay known.
         parts.recoveries = self.combined_recoveries(&change, &lost);
-        parts.estimated_stiffness = old
-            .estimated_stiffness
-            .iter()
-            .map(|one| GeometricStiffness { load: one.load.clone(), matrix: change.congruent(&one.matrix) })
-            .collect();
-        parts.modes.internal = old.modes.internal.as_ref().map(|internal| InternalRows {
-            dofs: internal.dofs.clone(),
-            shape: change.combined(&internal.shape),
-        });
         parts.modes.truncation = Vec::new();
-        parts.modes.provenance = vec!["combination of modes".to_owned(); parts.modes.eigenvalue.len()];
         parts.coordinates = Some(without(coordinates, &dropped, &change));
+        let (own, all) = (self.certificate(), coordinates.fixed_interface_eigenvalues());
         parts.certificate = Certificate {
-            remark: remark(&old.certificate, kept.len(), rows.len()),
-            fixed_interface: Some(of_some(fixed, &coordinates.fixed_interface_eigenvalues(), kept)),
+            remark: remark(own, kept.len(), all.len()),
+            fixed_interface: own.fixed_interface.as_ref().map(|fixed| of_some(fixed, &all, kept)),
             ..parts.certificate
         };
         let mut body = Self::new(parts)?;
         if self.storage() == Storage::F32 {
             body = body.rounded_to_f32()?;
         }
-        Ok((body, change.combined(&Mat::identity(self.n_modes(), self.n_modes()))))
+        Ok((body, change.modes().clone()))
     }
 
     /// Returns the static flexibility (nf x nf) that the modes lose by B_D p = 0, with B_D = `constraint`: that of the
@@ -123,17 +92,35 @@ impl FlexBody {
         let complement = Mat::from_fn(constraint.ncols(), constraint.nrows(), |j, d| {
             constraint[(d, j)] / stiffness[(j, j)]
         });
-        let gram = combine(constraint.as_ref(), complement.as_ref());
-        let lower = dense_cholesky(gram)?;
+        let lower = dense_cholesky(combine(constraint.as_ref(), complement.as_ref()))?;
         let half = solve_lower(&lower, &complement.transpose().to_owned());
-        Some(flexbody_linalg::gram(half.as_ref(), half.as_ref()))
+        Some(gram(half.as_ref(), half.as_ref()))
     }
 }
 
-/// Returns the coordinates that are amplitudes of fixed-interface modes.
-fn amplitudes(coordinates: &InterfaceCoordinates) -> Vec<usize> {
-    let names = coordinates.names.iter().enumerate();
-    names.filter(|(_, name)| InterfaceCoordinates::is_amplitude(name)).map(|(row, _)| row).collect()
+/// Returns the coordinates among `amplitudes` of the fixed-interface modes that are not `kept` (indices, ascending).
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for indices that do not ascend or are too large, and if none of the `n_modes` modes is left.
+fn dropped(amplitudes: &[usize], kept: &[usize], n_modes: usize) -> Result<Vec<usize>> {
+    let count = amplitudes.len();
+    if kept.windows(2).any(|pair| pair[0] >= pair[1]) || kept.last().is_some_and(|last| *last >= count) {
+        let message =
+            format!("a fixed-interface mode is asked for that is not among the {count} of the body");
+        return Err(refused(message, "give ascending numbers from 1, as in 1,3,5-9, or none"));
+    }
+    if count - kept.len() >= n_modes {
+        let message = "no mode is left: the only motions of the interfaces are those of the rigid body";
+        return Err(refused(message.to_owned(), "keep one fixed-interface mode at least"));
+    }
+    Ok((0..count).filter(|at| kept.binary_search(at).is_err()).map(|at| amplitudes[at]).collect())
+}
+
+fn without_coordinates() -> Error {
+    let message = "the body has no interface coordinates, which name its fixed-interface modes";
+    let help =
+        "give a body of --basis craig-bampton with all its modes, with the frame at the centre of mass";
+    refused(message.to_owned(), help)
 }
 
 fn picked(matrix: &Mat<f64>, rows: &[usize]) -> Mat<f64> {

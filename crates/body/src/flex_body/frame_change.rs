@@ -4,8 +4,8 @@ use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
 use super::rotated_stiffness::{split, transformed};
 use super::stated_damping::diagonal_ratios;
 use super::{
-    Carrier, Certificate, FixedInterface, FlexBody, LoadKind, LumpedBody, Modes, Parts, Recovery,
-    ReferenceConditions,
+    Carrier, Certificate, FixedInterface, FlexBody, InternalRows, LoadKind, LumpedBody, Modes, Parts,
+    Recovery, ReferenceConditions,
 };
 use crate::invariants::{BodyFrame, FrameChoice, Invariants, TermGroups, error_norms, principal_axes};
 use faer::Mat;
@@ -140,7 +140,10 @@ impl FlexBody {
             None => (parts.geometric_stiffness.iter().map(stiffness).collect(), Vec::new()),
         };
         // The estimate of modes with rigid motion is not known.
-        parts.estimated_stiffness = Vec::new();
+        parts.estimated_stiffness = match change.taken() {
+            Some(_) => Vec::new(),
+            None => parts.estimated_stiffness.iter().map(stiffness).collect(),
+        };
         parts.lumped =
             parts.lumped.iter().map(|lumped| changed_lumped(lumped, change, &invariants)).collect();
         // Rows that rigid motion changes are known only relative to the former frame.
@@ -177,7 +180,11 @@ impl FlexBody {
             modal_damping,
             shape: change.shapes(&old.shape, positions),
             rotation: old.rotation.as_ref().map(|rotation| change.rotations(rotation, &old.shape)),
-            internal: None,
+            // A change that takes rigid motion is refused for rows that belong to no node.
+            internal: old.internal.as_ref().map(|internal| InternalRows {
+                dofs: internal.dofs.clone(),
+                shape: change.combined(&internal.shape),
+            }),
             eigenvalue,
         }
     }

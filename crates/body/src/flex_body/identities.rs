@@ -128,7 +128,7 @@ impl Parts {
             }
         }
         let size = coordinates.names.len();
-        let modal = coordinates.names.iter().filter(|name| InterfaceCoordinates::is_amplitude(name)).count();
+        let modal = coordinates.amplitudes().len();
         // The interface alone does not determine the rotations of the nodes of a free interface.
         (rows.len() + modal == size).then(|| {
             Mat::from_fn(size, rigid_count(d), |i, j| rows.get(i).map_or(0.0, |row: &Vec<f64>| row[j]))

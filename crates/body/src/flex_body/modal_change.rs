@@ -187,6 +187,11 @@ impl ModalChange {
         Ok(Self { modes, taken: None, left_out: RigidMotions::default() })
     }
 
+    /// Returns X (nf x nf').
+    pub(super) fn modes(&self) -> &Mat<f64> {
+        &self.modes
+    }
+
     /// Returns the rigid motion (6 x nf) that is removed from each old mode; `None` if none is.
     pub(super) fn taken(&self) -> Option<&Mat<f64>> {
         self.taken.as_ref()

@@ -81,7 +81,7 @@ pub enum Turning {
     /// format 1.6).
     #[default]
     None,
-    /// Points and directors, and a part of the mass that does not turn, or may not: W0 = -C1~.
+    /// Points and directors, and a part of the mass that does not turn: W0 = -C1~.
     Partial,
     /// Points and directors only: every formula of M = Ms kron I3 holds, except for signs of products,
     /// since the mass of directors may belong to no position.

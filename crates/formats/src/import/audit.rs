@@ -70,9 +70,8 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
         let is_reported = |check: &IdentityCheck| check.name != "velocity_gram_psd";
         let turning = turning_part(body, &invariants);
         let is_judged = |check: &IdentityCheck| turning.is_none() || !is_of_points(check.name);
-        checks.extend(
-            identities_of_any_body.into_iter().filter(is_reported).filter(is_judged).map(of_identity),
-        );
+        let judged = identities_of_any_body.into_iter().filter(|one| is_reported(one) && is_judged(one));
+        checks.extend(judged.map(of_identity));
         notes.extend(turning.map(|part| {
             format!(
                 "the modes break identities of points of mass by {part:.1e}, as nodes whose rotations carry mass do (beams, shells): this format has no place for the second moments of nodes, and its W2 and W3 are as inexact as that"

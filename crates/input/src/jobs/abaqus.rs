@@ -2,13 +2,13 @@
 //! into the folder of the deck `job.inp`, as `row column value` (FORMAT=COORDINATE) or with the node and the direction
 //! of row and column (FORMAT=MATRIX INPUT, LABELS). The matrices may instead be those of a substructure.
 
-use super::calculix::{dashpots_left_out, refuse_axisymmetric};
 use super::deck::{Card, Deck, fields};
 use super::deck_mesh::DeckMesh;
 use super::described::{DescribedRows, Program, described_of_job, nothing};
 use super::element_kinds::{family, has_internal_nodes};
 use super::job::{FromFile, JobFile, JobModel, JobReader, both, condensed, missing};
 use super::matrix_files::{CoordinateFile, has_labels, labelled};
+use super::not_taken::{dashpots_left_out, refuse_axisymmetric};
 use super::siblings::{is_deck, siblings};
 use crate::digits::{COUNTED, written_digits};
 use crate::matrices::MatrixRole;

@@ -7,11 +7,11 @@ use super::deck_mesh::DeckMesh;
 use super::deck_surfaces::Surfaces;
 use super::dependent_rows::with_dependent_rows;
 use super::described::{DescribedRows, Program, constraints, described_of_job, nothing};
-use super::element_kinds::is_axisymmetric;
 use super::expanded::{Once, copies_in_sets, label_once};
-use super::job::{JobFile, JobModel, JobReader, both, damping_left_out, missing, refused_elements};
+use super::job::{JobFile, JobModel, JobReader, both, missing};
 use super::knots::Knots;
 use super::matrix_files::CoordinateFile;
+use super::not_taken::{dashpots_left_out, refuse_axisymmetric, refuse_elements};
 use super::siblings::{is_deck, siblings};
 use super::transformed::along_model;
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
@@ -100,7 +100,6 @@ impl JobReader for Calculix {
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
         diagnostics.extend(warnings.into_iter().flatten());
-
         let mut files = deck.seen()?;
         files.extend([("stiffness", stiffness_file), ("mass", mass_file), ("dofs", dofs_file)]);
         let job = JobModel {
@@ -120,40 +119,12 @@ impl JobReader for Calculix {
     }
 }
 
-/// Returns FB111 for elements whose rows cannot be those of a body in space.
-pub(super) fn refuse_axisymmetric(mesh: &DeckMesh, deck: &Path) -> Diagnosed<()> {
-    let kinds: BTreeSet<&str> = mesh
-        .elements
-        .iter()
-        .map(|elements| elements.kind.as_str())
-        .filter(|kind| is_axisymmetric(kind))
-        .collect();
-    if kinds.is_empty() {
-        return Ok(());
-    }
-    let why = "axisymmetric models have radius and axis for coordinates, and no motion across their plane";
-    let diagnostic = refused_elements(&kinds.into_iter().collect::<Vec<_>>(), why, deck);
-    Err(vec![diagnostic.with_help("revolve the mesh, and write K and M of solid elements in space")])
-}
-
 /// Returns FB111 for axisymmetric elements, and for beams, whose solids have other nodes than the deck.
 fn refuse_kinds(mesh: &DeckMesh, deck: &Path) -> Diagnosed<()> {
     refuse_axisymmetric(mesh, deck)?;
-    let kinds: BTreeSet<&str> = mesh
-        .elements
-        .iter()
-        .map(|elements| elements.kind.as_str())
-        .filter(|kind| kind.starts_with('B'))
-        .collect();
-    if kinds.is_empty() {
-        return Ok(());
-    }
     let why = "CalculiX expands beams into solids, whose nodes are not in the deck";
-    let diagnostic = refused_elements(&kinds.into_iter().collect::<Vec<_>>(), why, deck);
-    Err(vec![
-        diagnostic
-            .with_help("use solid elements, or write the beams with a program that keeps their rotations"),
-    ])
+    let help = "use solid elements, or write the beams with a program that keeps their rotations";
+    refuse_elements(mesh, |kind| kind.starts_with('B'), why, help, deck)
 }
 
 /// Returns FB110 if what CalculiX printed was kept beside the deck (`job.log`, `job.out`) and reports an error: CalculiX
@@ -193,12 +164,6 @@ fn stressed(deck: &Deck, path: &Path) -> Option<Diagnostic> {
     let message = "K is written in a step with PERTURBATION after another step: it contains the stress of the loads there";
     (is_perturbed && steps.next().is_some())
         .then(|| Diagnostic::new(Code::DeckStressed, message).in_file(path))
-}
-
-/// Returns the warning about dashpots of a keyword deck, if it has some.
-pub(super) fn dashpots_left_out(mesh: &DeckMesh, deck: &Path) -> Option<Diagnostic> {
-    let dashpots = mesh.elements.iter().filter(|elements| elements.kind.starts_with("DASHPOT"));
-    damping_left_out(dashpots.map(|elements| elements.members.len()).sum(), "dashpots", deck)
 }
 
 /// Describes the elements of a job, nothing if its matrices have rows of solids into which shells were expanded.

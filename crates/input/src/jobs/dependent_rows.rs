@@ -69,8 +69,9 @@ fn resolved(
 fn extended(mut job: JobModel, dependent: Vec<DependentRow>) -> JobModel {
     let n = job.dofs.len();
     let all = n + dependent.len();
-    let mut springs = entries(&job.stiffness.matrix);
-    let diagonal = diagonal(&job.stiffness.matrix);
+    let (stiffness, mass) = (&job.stiffness.matrix, &job.mass.matrix);
+    let mut springs: Vec<(u32, u32, f64)> = stiffness.triplets().collect();
+    let diagonal: Vec<f64> = (0..n).map(|row| stiffness.get(row, row)).collect();
     for (at, row) in (n as u32..).zip(&dependent) {
         let size = spring(row, &diagonal, &job.dofs);
         let terms = || row.terms.iter().map(|(to, weight)| (*to, -weight)).chain([(at, 1.0)]);
@@ -78,8 +79,9 @@ fn extended(mut job: JobModel, dependent: Vec<DependentRow>) -> JobModel {
             springs.extend(terms().map(|(from, b)| (to, from, size * a * b)));
         }
     }
+    let mass = CscMatrix::from_triplets(all, all, &mass.triplets().collect::<Vec<_>>());
     job.stiffness.matrix = CscMatrix::from_triplets(all, all, &springs);
-    job.mass.matrix = CscMatrix::from_triplets(all, all, &entries(&job.mass.matrix));
+    job.mass.matrix = mass;
     job.dofs.extend(dependent.iter().map(|row| row.label));
     job.followers = job.followers.map(|followers| followers.with_more_rows(dependent.len()));
     let nodes: Vec<i64> =
@@ -110,20 +112,4 @@ fn spring(row: &DependentRow, diagonal: &[f64], labels: &[DofLabel]) -> f64 {
     let size = if of_terms > 0.0 { of_terms } else { largest(&mut (0..diagonal.len()).filter(is_like)) };
     let weight: f64 = terms().filter(|(at, _)| is_like(at)).map(|(_, weight)| weight * weight).sum();
     if size > 0.0 { size / weight.max(1.0) } else { 1.0 }
-}
-
-fn diagonal(matrix: &CscMatrix) -> Vec<f64> {
-    let entry = |column: usize| {
-        let (rows, values) = matrix.column(column);
-        rows.iter().zip(values).filter(|(row, _)| **row as usize == column).map(|(_, value)| value).sum()
-    };
-    (0..matrix.n_cols()).map(entry).collect()
-}
-
-fn entries(matrix: &CscMatrix) -> Vec<(u32, u32, f64)> {
-    let column = |column: usize| {
-        let (rows, values) = matrix.column(column);
-        rows.iter().zip(values).map(move |(row, value)| (*row, column as u32, *value))
-    };
-    (0..matrix.n_cols()).flat_map(column).collect()
 }

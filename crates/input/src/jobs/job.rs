@@ -91,12 +91,6 @@ pub(super) fn damping_left_out(count: usize, what: &str, deck: &Path) -> Option<
     (count > 0).then(|| Diagnostic::new(Code::DeckDamping, message).in_file(deck))
 }
 
-/// Returns FB111 for elements that have no model in space: `why` says so in words.
-pub(super) fn refused_elements(kinds: &[&str], why: &str, deck: &Path) -> Diagnostic {
-    let message = format!("elements of type {}: {why}", kinds.join(", "));
-    Diagnostic::new(Code::DeckUnsupported, message).in_file(deck)
-}
-
 /// Returns FB109: a part of a job is missing.
 pub(super) fn missing(path: &Path, what: &str, help: &str) -> Diagnostic {
     Diagnostic::new(Code::JobIncomplete, format!("{what} is missing")).in_file(path).with_help(help)

@@ -21,6 +21,7 @@ pub(crate) struct TextArray;
 const HELP: &str = "write one row on each line, numbers with a decimal point between blanks, commas, semicolons or tabs: numpy.savetxt(file, K)";
 const BOTH_TRIANGLES: &str = "write both triangles: K + numpy.tril(K, -1).T";
 const LIST: &str = "give all rows and columns; a list of `row column value` needs the first line `%%MatrixMarket matrix coordinate real symmetric` and the line of its sizes, and CalculiX and Abaqus write such lists for their deck: convert the deck (.inp) with the matrices beside it";
+const COLUMN: &str = "name the file of the matrix (CalculiX: .sti or .mas; its .dof lists the rows and is the value of `dof`), or write one row on each line: numpy.savetxt(file, K)";
 
 /// Beginnings of comments that are heads of lists `row column value`: Matrix Market, and MFEM's `PrintMatlab`.
 const HEADS_OF_LISTS: [&[u8]; 2] = [b"%%matrixmarket", b"% size "];
@@ -100,8 +101,16 @@ fn read(source: &MatrixSource<'_>) -> Diagnosed<RawMatrix> {
 }
 
 fn not_square(rows: &str, columns: u64) -> Diagnostic {
-    let message = format!("matrix has {rows} rows and {columns} columns");
-    Diagnostic::new(Code::MatrixNotSquare, message).with_help(if columns == 3 { LIST } else { HELP })
+    let message = match columns {
+        1 => "file has one number on each line, a matrix has whole rows".into(),
+        _ => format!("matrix has {rows} rows and {columns} columns"),
+    };
+    let help = match columns {
+        1 => COLUMN,
+        3 => LIST,
+        _ => HELP,
+    };
+    Diagnostic::new(Code::MatrixNotSquare, message).with_help(help)
 }
 
 fn read_array(file: &InputFile, compression: Compression) -> Diagnosed<Array> {

@@ -150,7 +150,7 @@ fn texts_that_are_no_square_arrays_are_refused_by_their_line() {
     for (content, code, line, words) in [
         ("2 1 0\n1 2 1\n", Code::MatrixNotSquare, None, "2 rows and 3 columns"),
         ("2 1\n1 2\n0 1\n", Code::MatrixNotSquare, Some(3), "more than 2 rows and 2 columns"),
-        ("1\n2\n3\n", Code::MatrixNotSquare, Some(2), "1 columns"),
+        ("1\n2\n3\n", Code::MatrixNotSquare, Some(2), "one number on each line"),
         ("1 1 5.5\n2 2 6.5\n3 3 7.5\n4 4 8.5\n", Code::MatrixNotSquare, Some(4), "row column value"),
         ("2 1\n1 2 3\n", Code::MatrixCount, Some(2), "the row has 3 values, the first row has 2"),
         ("2 1\n1\n", Code::MatrixCount, Some(2), "the row has 1 values"),

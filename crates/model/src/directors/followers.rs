@@ -50,13 +50,9 @@ impl RawFollowers {
         let before = self.follows.n_rows();
         let moved = |row: u32| if (row as usize) < before { row } else { row + added as u32 };
         let with_rows = |matrix: &CscMatrix, [rows, columns]: [usize; 2], column_of: &dyn Fn(u32) -> u32| {
-            let mut entries = Vec::with_capacity(matrix.nnz());
-            for column in 0..matrix.n_cols() as u32 {
-                let (rows, values) = matrix.column(column as usize);
-                let to = column_of(column);
-                entries.extend(rows.iter().zip(values).map(|(&row, &value)| (moved(row), to, value)));
-            }
-            CscMatrix::from_triplets(rows, columns, &entries)
+            let entries =
+                matrix.triplets().map(|(row, column, value)| (moved(row), column_of(column), value));
+            CscMatrix::from_triplets(rows, columns, &entries.collect::<Vec<_>>())
         };
         let follows = with_rows(&self.follows, [before + added, self.follows.n_cols()], &|column| column);
         let all = self.mass.n_cols() + added;

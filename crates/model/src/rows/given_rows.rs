@@ -75,13 +75,10 @@ impl RowMap {
         }
         let extended = |matrix: &CscMatrix, with_sums: bool| {
             let mut entries = Vec::with_capacity(matrix.nnz());
-            for given in 0..n_given {
-                let (rows, values) = matrix.column(given);
-                for (&row, &value) in rows.iter().zip(values) {
-                    entries.push((row, given as u32, value));
-                    let sums = followers.get(&row).filter(|_| with_sums).into_iter().flatten();
-                    entries.extend(sums.map(|&(to, factor)| (to, given as u32, factor * value)));
-                }
+            for (row, given, value) in matrix.triplets() {
+                entries.push((row, given, value));
+                let sums = followers.get(&row).filter(|_| with_sums).into_iter().flatten();
+                entries.extend(sums.map(|&(to, factor)| (to, given, factor * value)));
             }
             CscMatrix::from_triplets(all + dependent.len(), n_given, &entries)
         };

@@ -98,11 +98,6 @@ impl<'c> Case<'c> {
         Self { fixed, ..self }
     }
 
-    /// Returns the fixed-interface modes that may be left out.
-    pub(super) fn fixed(&self) -> Option<&'c FixedInterfaceModes<'c>> {
-        self.fixed
-    }
-
     /// Returns norms of the terms at tier 0 and, if `tier_1` is set and the body holds all groups, at tier 1. Empty if
     /// there are no bounds for the scene.
     fn norms(&self, tier_1: bool) -> Vec<Norms> {

@@ -1,8 +1,8 @@
 //! Choice of terms and shapes during a selection.
 
 use super::ranking::first_of;
-use super::shapes::{ModeShare, Pool};
-use super::trial::Trial;
+use super::shapes::Pool;
+use super::trial::{ModeShare, Trial};
 use flexbody_body::flex_body::TermGroups;
 
 /// Current choice of terms and shapes.

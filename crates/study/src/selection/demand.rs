@@ -2,7 +2,7 @@
 //! contain, and those that the selected modes represent (theory section 8).
 
 use super::cases::{Case, bounded, scenes};
-use super::shapes::{FixedInterfaceModes, Pool};
+use super::shapes::{FixedInterfaceModes, Pool, PoolShapes};
 use super::situation::{PointRows, Situation};
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -47,6 +47,8 @@ pub(super) struct Demand<'c> {
     pub scene: &'c Scene,
     pub situation: Situation,
     pub loads: Vec<BodyPoint>,
+    /// Fixed-interface modes of a Craig-Bampton body that may be left out.
+    fixed: Option<&'c FixedInterfaceModes<'c>>,
     /// Scenes in which models are tested.
     pub cases: Vec<Case<'c>>,
     /// Warnings and notes about scene and body.
@@ -83,6 +85,7 @@ impl<'c> Demand<'c> {
             scene,
             situation: Situation::new(body, scene, &loads),
             loads,
+            fixed: framed.fixed.as_ref(),
             cases,
             diagnostics: &framed.diagnostics,
             by_bounds: bounds.iter().find(|trial| trial.passed()).map(|trial| (trial.kept, trial.worst)),
@@ -93,9 +96,9 @@ impl<'c> Demand<'c> {
         })
     }
 
-    /// Returns the fixed-interface modes if the pool is theirs.
-    pub(super) fn fixed(&self, pool: Pool) -> Option<&'c FixedInterfaceModes<'c>> {
-        self.cases.first().and_then(Case::fixed).filter(|_| pool == Pool::FixedInterface)
+    /// Returns the shapes of a pool.
+    pub(super) fn shapes(&self, pool: Pool) -> PoolShapes<'c> {
+        PoolShapes::new(pool, self.body, self.fixed)
     }
 
     /// Returns the groups that the body holds and that bounds do not rule out.

@@ -30,10 +30,10 @@ pub use norms::Norms;
 pub(crate) use ranking::{fewest, first_of};
 pub use search::most_excited_modes;
 pub use select::{CaseSelection, Selection, rule_out, select, select_judged};
-pub use shapes::{FixedInterfaceChoice, FixedInterfaceModes, ModeShare, Pool};
+pub use shapes::{FixedInterfaceChoice, FixedInterfaceModes, Pool};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
-pub use trial::{Trial, TrialRuns};
+pub use trial::{ModeShare, Trial, TrialRuns};
 #[cfg(feature = "hdf5")]
 pub(crate) use variations::stops;
 pub use variations::{EnoughParts, VariedSelection};

@@ -3,7 +3,7 @@
 use super::bounds::Variation;
 use super::choice::Choice;
 use super::demand::Demand;
-use super::shapes::{FixedInterfaceModes, Pool};
+use super::shapes::Pool;
 use super::situation::PointRows;
 use super::trial::Trial;
 use crate::reference::ReferenceError;
@@ -75,10 +75,7 @@ impl ModeReasons {
             return None;
         }
         let body = demands[0].body;
-        let lambda = match demands[0].fixed(choice.pool) {
-            Some(fixed) => fixed.eigenvalues(),
-            None => &body.modes().eigenvalue,
-        };
+        let lambda = demands[0].shapes(choice.pool).eigenvalues();
         let frequency_hz = |mode: usize| body.units().frequency_of(lambda[mode]);
         let worth = |mode: Option<&usize>, trial: Option<&Trial>| -> Option<ModeWorth> {
             let trial = trial?;
@@ -149,11 +146,7 @@ fn excited(demands: &[Demand<'_>], pool: Pool, modes: &[usize]) -> Vec<Excitatio
 /// Returns the largest force on every mode of a pool by each load and motion of a load case.
 fn excitations(demand: &Demand<'_>, pool: Pool) -> Vec<(String, Vec<f64>)> {
     let (body, scene, duration) = (demand.body, demand.scene, demand.situation.duration.value);
-    let (rows, fixed) = (PointRows::new(body), demand.fixed(pool));
-    let in_pool = |psi: DMatrix<f64>| match fixed {
-        Some(fixed) => PointRows::combined(&psi, fixed.shapes()),
-        None => psi,
-    };
+    let (rows, shapes) = (PointRows::new(body), demand.shapes(pool));
     let mut all = Vec::new();
     let along = |psi: &DMatrix<f64>, history: &VectorHistory| -> Vec<f64> {
         let largest = Variation::of_vector(history, duration).largest;
@@ -167,10 +160,10 @@ fn excitations(demand: &Demand<'_>, pool: Pool) -> Vec<(String, Vec<f64>)> {
         let Load { at, force, torque, .. } = load;
         if !force.is_nothing() {
             let name = if load.is_named() { at.to_string() } else { format!("the force at {at}") };
-            all.push((name, along(&in_pool(rows.of(point)), force)));
+            all.push((name, along(&shapes.rows(rows.of(point)), force)));
         }
         if !torque.is_nothing() {
-            all.push((format!("the torque at {at}"), along(&in_pool(rows.of_rotation(point)), torque)));
+            all.push((format!("the torque at {at}"), along(&shapes.rows(rows.of_rotation(point)), torque)));
         }
     }
     let frame = if scene.prescribes() || scene.carried.is_some() {
@@ -180,9 +173,9 @@ fn excitations(demand: &Demand<'_>, pool: Pool) -> Vec<(String, Vec<f64>)> {
     };
     let modal = frame.iter().filter_map(|motion| motion.modal(body.invariants()));
     let modal: Vec<DMatrix<f64>> =
-        modal.map(|forces| in_pool(DMatrix::from_row_slice(1, forces.len(), &forces))).collect();
+        modal.map(|forces| shapes.rows(DMatrix::from_row_slice(1, forces.len(), &forces))).collect();
     let largest = |j: usize| modal.iter().map(|forces| forces[(0, j)].abs()).fold(0.0, f64::max);
-    let count = fixed.map_or(body.n_modes(), FixedInterfaceModes::len);
+    let count = shapes.eigenvalues().len();
     let name = if scene.carried.is_some() { "the motion of the carrier" } else { "the rotation" };
     all.push((name.to_owned(), (0..count).map(largest).collect()));
     // A scene that starts modes by their numbers picks from modes.

@@ -1,6 +1,6 @@
 //! Ranking of modes by their contribution to a motion.
 
-use super::shapes::ModeShare;
+use super::trial::ModeShare;
 use flexbody_base::error::Result;
 use flexbody_linalg::ties::descending;
 use flexbody_motion::scene::Tolerance;

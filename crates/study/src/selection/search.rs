@@ -272,7 +272,7 @@ pub fn most_excited_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<u
     let mut weight = vec![0.0f64; cases.first().map_or(0, |(body, ..)| body.n_modes())];
     for (body, scene, motion) in cases {
         let case = Case::new(body, scene, &Context::QUIET)?;
-        let own = weights(&case.runs().shares(motion), &scene.requirements.tolerance);
+        let own = weights(&case.runs().shares(Pool::Modes, motion), &scene.requirements.tolerance);
         weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
     }
     Ok(by_weight(&weight))
@@ -362,7 +362,7 @@ impl SelectionSearch<'_> {
         choice.shares.clear();
         for case in self.cases {
             for TestScene { runs, measure } in &case.scenes {
-                let shares = runs.shares_of(choice.pool, measure.trace());
+                let shares = runs.shares(choice.pool, measure.trace());
                 let own = weights(&shares, &runs.scene.requirements.tolerance);
                 weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
                 if choice.shares.is_empty() {
@@ -478,12 +478,7 @@ fn phase_drifts(growth: f64) -> Diagnostic {
 /// Returns warnings about dropped shapes of a pool that a load excites near their frequency.
 fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, pool: Pool, kept: &[usize]) -> Vec<Diagnostic> {
     let (body, scene) = (runs.body, runs.scene);
-    let (rows, fixed) = (PointRows::new(body), runs.fixed.filter(|_| pool == Pool::FixedInterface));
-    let eigenvalues = fixed.map_or(&*body.modes().eigenvalue, |fixed| fixed.eigenvalues());
-    let (noun, damping) = match pool {
-        Pool::Modes => ("mode", body.modes().damping_ratio.clone()),
-        Pool::FixedInterface => ("fixed-interface mode", vec![0.0; eigenvalues.len()]),
-    };
+    let (rows, shapes) = (PointRows::new(body), runs.shapes(pool));
     let spin = measure.trace().extremes.spin;
     let mut diagnostics = Vec::new();
     for (load, point) in scene.loads.iter().zip(runs.loads) {
@@ -495,15 +490,12 @@ fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, pool: Pool, kept: &[u
             }
             _ => vec![turning],
         };
-        let modal = match fixed {
-            Some(fixed) => PointRows::combined(&rows.of(point), fixed.shapes()),
-            None => rows.of(point),
-        };
-        for (j, lambda) in eigenvalues.iter().enumerate() {
+        let modal = shapes.rows(rows.of(point));
+        for (j, lambda) in shapes.eigenvalues().iter().enumerate() {
             let moved =
                 modal.column(j).norm() * load.force.main_direction().map_or(0.0, |along| along.norm());
             let near = |rate: &&f64| {
-                let width = RESONANCE_DISTANCE.max(3.0 * damping[j]);
+                let width = RESONANCE_DISTANCE.max(3.0 * shapes.damping_ratio(j));
                 (*rate / lambda.sqrt() - 1.0).abs() < width
             };
             if moved == 0.0 || kept.binary_search(&j).is_ok() {
@@ -511,7 +503,8 @@ fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, pool: Pool, kept: &[u
             }
             if let Some(rate) = rates.iter().find(near) {
                 let message = format!(
-                    "{noun} {} of frequency {:.4e} is dropped, but the load at {} excites it at {:.4e} (oscillations per unit of time)",
+                    "{} {} of frequency {:.4e} is dropped, but the load at {} excites it at {:.4e} (oscillations per unit of time)",
+                    shapes.noun(),
                     j + 1,
                     lambda.sqrt() / TAU,
                     load.at,

@@ -4,12 +4,10 @@
 //! The modes of a Craig-Bampton body mix motions of the interfaces with fixed-interface modes, so that hardly one can go. The
 //! fixed-interface modes can: without them the response to loads at the interfaces is still that of statics.
 
-use super::situation::PointRows;
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::combine;
-use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{FramedScene, Scene, Trace, damped_once};
 use nalgebra::DMatrix;
 use std::borrow::Cow;
@@ -22,23 +20,6 @@ pub enum Pool {
     Modes,
     /// Fixed-interface modes of a Craig-Bampton body, beside all motions of its interfaces.
     FixedInterface,
-}
-
-/// Contribution of a mode to the motion of a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModeShare {
-    /// Largest |q|.
-    pub amplitude: f64,
-    /// Largest deflection of a watched point (or of any node if none is watched) by this mode alone, relative to the
-    /// largest of all modes together.
-    pub deflection: f64,
-    /// Root of its largest elastic energy, relative to the largest of all modes together.
-    pub stress: f64,
-    /// Largest contribution to a recovery over its limit, without the part that static columns hold; `None` if no
-    /// recovery has a limit.
-    pub recovery: Option<f64>,
-    /// True if the mode is kept.
-    pub kept: bool,
 }
 
 /// Fixed-interface modes that a selection keeps.
@@ -79,21 +60,6 @@ impl<'b> FixedInterfaceModes<'b> {
         })
     }
 
-    /// Returns their number.
-    pub(super) fn len(&self) -> usize {
-        self.eigenvalues.len()
-    }
-
-    /// Returns the eigenvalues. Unit: 1/time^2.
-    pub(super) fn eigenvalues(&self) -> &[f64] {
-        &self.eigenvalues
-    }
-
-    /// Returns the deformations in the modes of the body (nf x number).
-    pub(super) fn shapes(&self) -> &Mat<f64> {
-        &self.shapes
-    }
-
     /// Returns the body with the fixed-interface modes `kept` in the frame and with the damping of the scene, and the stiffness
     /// Psi'K Psi_r that couples its modes to those of the whole body.
     ///
@@ -106,42 +72,55 @@ impl<'b> FixedInterfaceModes<'b> {
         let (body, _) = damped_once(Cow::Owned(body.into_owned()), scene)?;
         Ok((body.into_owned(), shared))
     }
+}
 
-    /// Returns the contribution of every fixed-interface mode to a motion of the whole body, `framed` in the frame of the
-    /// scene; deflections are those of the `watched` points or, without any, of all nodes.
-    pub(super) fn shares(&self, framed: &FlexBody, watched: &[BodyPoint], trace: &Trace) -> Vec<ModeShare> {
-        let rows = PointRows::new(framed);
-        let mut longest = vec![0.0f64; self.len()];
-        let mut look_at = |rows: &DMatrix<f64>| {
-            let moved = PointRows::combined(rows, &self.shapes);
-            longest
-                .iter_mut()
-                .zip(moved.column_iter())
-                .for_each(|(most, column)| *most = most.max(column.norm()));
+/// Shapes of a pool, in terms of the modes of a body.
+#[derive(Clone, Copy)]
+pub(super) struct PoolShapes<'a> {
+    body: &'a FlexBody,
+    /// The fixed-interface modes of a pool of these.
+    fixed: Option<&'a FixedInterfaceModes<'a>>,
+}
+
+impl<'a> PoolShapes<'a> {
+    /// Returns the shapes of a pool: modes of `body`, or its fixed-interface modes `fixed`.
+    pub(super) fn new(pool: Pool, body: &'a FlexBody, fixed: Option<&'a FixedInterfaceModes<'a>>) -> Self {
+        Self { body, fixed: fixed.filter(|_| pool == Pool::FixedInterface) }
+    }
+
+    /// Returns the name of a shape.
+    pub(super) fn noun(&self) -> &'static str {
+        if self.fixed.is_some() { "fixed-interface mode" } else { "mode" }
+    }
+
+    /// Returns the eigenvalue of each shape. Unit: 1/time^2.
+    pub(super) fn eigenvalues(&self) -> &'a [f64] {
+        self.fixed.map_or(&self.body.modes().eigenvalue, |fixed| &fixed.eigenvalues)
+    }
+
+    /// Returns the damping ratio of each shape; those of fixed-interface modes are not known and count as zero.
+    pub(super) fn damping_ratio(&self, at: usize) -> f64 {
+        if self.fixed.is_some() { 0.0 } else { self.body.modes().damping_ratio[at] }
+    }
+
+    /// Returns rows of the modes (k x nf) in the shapes of the pool.
+    pub(super) fn rows(&self, of_modes: DMatrix<f64>) -> DMatrix<f64> {
+        let Some(FixedInterfaceModes { shapes, .. }) = self.fixed else { return of_modes };
+        let entry = |k: usize, at: usize| {
+            (0..of_modes.ncols()).map(|j| of_modes[(k, j)] * shapes[(j, at)]).sum::<f64>()
         };
-        match watched {
-            [] => (0..framed.n_nodes()).for_each(|node| look_at(&rows.of_node(node))),
-            points => points.iter().for_each(|point| look_at(&rows.of(point))),
-        }
-        let deflection = match trace.extremes.watched.as_slice() {
-            [] => trace.extremes.deflection.value * framed.extent(),
-            peaks => peaks.iter().map(|peak| peak.value).fold(0.0, f64::max),
+        DMatrix::from_fn(of_modes.nrows(), shapes.ncols(), entry)
+    }
+
+    /// Returns the largest amplitude of each shape in a motion of the body.
+    pub(super) fn largest_amplitudes(&self, trace: &Trace) -> Vec<f64> {
+        let Some(FixedInterfaceModes { amplitudes, .. }) = self.fixed else {
+            return trace.extremes.amplitudes.clone();
         };
-        let energy = trace.extremes.elastic.sqrt();
-        let share = |at: usize| {
-            let own =
-                |q: &Vec<f64>| q.iter().enumerate().map(|(j, q)| self.amplitudes[(at, j)] * q).sum::<f64>();
-            let amplitude = trace.q.iter().map(|q| own(q).abs()).fold(0.0, f64::max);
-            let moved = longest[at] * amplitude;
-            let root_energy = (0.5 * self.eigenvalues[at]).sqrt() * amplitude;
-            ModeShare {
-                amplitude,
-                deflection: moved / deflection.max(trace.resolution.deflection),
-                stress: root_energy / energy.max(trace.resolution.root_energy),
-                recovery: None,
-                kept: true,
-            }
+        let largest = |at: usize| {
+            let own = |q: &Vec<f64>| q.iter().enumerate().map(|(j, q)| amplitudes[(at, j)] * q).sum::<f64>();
+            trace.q.iter().map(|q| own(q).abs()).fold(0.0, f64::max)
         };
-        (0..self.len()).map(share).collect()
+        (0..amplitudes.nrows()).map(largest).collect()
     }
 }

@@ -2,7 +2,6 @@
 //! number.
 
 use super::bounds::{Driven, ModalLoad, Rotation, Start, TurnedTorques, Variation};
-use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::Invariants;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
@@ -432,14 +431,6 @@ impl<'b> PointRows<'b> {
     pub(super) fn of_node(&self, node: usize) -> DMatrix<f64> {
         let shape = &self.body.modes().shape;
         DMatrix::from_fn(3, self.body.n_modes(), |k, j| shape[(3 * node + k, j)])
-    }
-
-    /// Returns rows of the modes (3 x nf) in combinations of the modes (nf x k).
-    pub(super) fn combined(rows: &DMatrix<f64>, combinations: &Mat<f64>) -> DMatrix<f64> {
-        let entry = |k: usize, at: usize| {
-            (0..rows.ncols()).map(|j| rows[(k, j)] * combinations[(j, at)]).sum::<f64>()
-        };
-        DMatrix::from_fn(rows.nrows(), combinations.ncols(), entry)
     }
 
     /// Returns the rows with column j multiplied by `weight(j)`.

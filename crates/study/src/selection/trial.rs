@@ -3,7 +3,7 @@
 use super::bounds::{Driven, ErrorBound, Variation};
 use super::dropped_terms::{DroppedTerms, torques_of_w3};
 use super::norms::Norms;
-use super::shapes::{FixedInterfaceModes, ModeShare, Pool};
+use super::shapes::{FixedInterfaceModes, Pool, PoolShapes};
 use super::situation::{PointRows, Situation};
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -242,12 +242,14 @@ impl TrialRuns<'_> {
         Ok((trial, history.ok()))
     }
 
+    /// Returns the shapes of a pool.
+    pub(super) fn shapes(&self, pool: Pool) -> PoolShapes<'_> {
+        PoolShapes::new(pool, self.body, self.fixed)
+    }
+
     /// Returns the number of shapes of a pool.
     pub(super) fn number_of(&self, pool: Pool) -> usize {
-        match pool {
-            Pool::Modes => self.body.n_modes(),
-            Pool::FixedInterface => self.fixed.map_or(0, FixedInterfaceModes::len),
-        }
+        self.shapes(pool).eigenvalues().len()
     }
 
     /// Returns the body with `shapes` of a pool and the `groups`, of the `whole` body in the frame of the scene, and the stiffness
@@ -274,14 +276,6 @@ impl TrialRuns<'_> {
                 Ok((Cow::Owned(whole.clone().subset(&subset)?), None))
             }
             _ => Ok((Cow::Owned(whole.clone().subset(&all_modes)?), None)),
-        }
-    }
-
-    /// Returns the contribution of every shape of a pool to a motion of the body.
-    pub(super) fn shares_of(&self, pool: Pool, trace: &Trace) -> Vec<ModeShare> {
-        match (pool, self.fixed) {
-            (Pool::FixedInterface, Some(fixed)) => fixed.shares(self.body, self.watched, trace),
-            _ => self.shares(trace),
         }
     }
 
@@ -442,7 +436,7 @@ impl TrialRuns<'_> {
     /// Returns the largest deflection of a watched point, or of any node if none is watched, for |Lambda^(1/2) q| = 1.
     fn reach(&self) -> f64 {
         let mut reach = 0.0f64;
-        self.each_watched(|rows| reach = reach.max(self.reach_of(rows)));
+        self.each_watched(|rows| reach = reach.max(self.reach_of(&rows)));
         reach
     }
 
@@ -452,20 +446,22 @@ impl TrialRuns<'_> {
     }
 
     /// Calls `hear` with Psi of every watched point, or of every node if none is watched.
-    fn each_watched(&self, mut hear: impl FnMut(&DMatrix<f64>)) {
+    fn each_watched(&self, mut hear: impl FnMut(DMatrix<f64>)) {
         let rows = PointRows::new(self.body);
         match self.watched {
-            [] => (0..self.body.n_nodes()).for_each(|node| hear(&rows.of_node(node))),
-            points => points.iter().for_each(|point| hear(&rows.of(point))),
+            [] => (0..self.body.n_nodes()).for_each(|node| hear(rows.of_node(node))),
+            points => points.iter().for_each(|point| hear(rows.of(point))),
         }
     }
 
-    /// Returns the contribution of every mode to a motion of the body.
-    pub fn shares(&self, trace: &Trace) -> Vec<ModeShare> {
-        // Largest displacement of each mode, then its shares of deflection and stress.
-        let mut longest = vec![0.0f64; self.body.n_modes()];
+    /// Returns the contribution of every shape of a pool to a motion of the body.
+    pub(super) fn shares(&self, pool: Pool, trace: &Trace) -> Vec<ModeShare> {
+        let shapes = self.shapes(pool);
+        let (eigenvalues, amplitudes) = (shapes.eigenvalues(), shapes.largest_amplitudes(trace));
+        // Largest displacement of each shape, then its shares of deflection and stress.
+        let mut longest = vec![0.0f64; eigenvalues.len()];
         self.each_watched(|rows| {
-            for (longest, column) in longest.iter_mut().zip(rows.column_iter()) {
+            for (longest, column) in longest.iter_mut().zip(shapes.rows(rows).column_iter()) {
                 *longest = longest.max(column.norm());
             }
         });
@@ -476,14 +472,16 @@ impl TrialRuns<'_> {
         } else {
             extremes.watched.iter().map(|peak| peak.value).fold(0.0, f64::max)
         };
+        // Fixed-interface modes are ranked without the recoveries, whose contributions are those of modes.
         let recovery = RecoveryMeasure::new(self.body, self.scene, trace.recovered.as_ref());
-        let recovery = recovery.zip(trace.recovered.as_ref()).map(|(measure, recovered)| {
+        let recovery = recovery.filter(|_| pool == Pool::Modes).zip(trace.recovered.as_ref());
+        let recovery = recovery.map(|(measure, recovered)| {
             measure.contributions(&extremes.amplitudes, &recovered.dynamic_amplitudes(self.body))
         });
         let share = |j: usize| {
-            let amplitude = extremes.amplitudes[j];
+            let amplitude = amplitudes[j];
             let moved = longest[j] * amplitude;
-            let root_energy = (0.5 * self.body.modes().eigenvalue[j]).sqrt() * amplitude;
+            let root_energy = (0.5 * eigenvalues[j]).sqrt() * amplitude;
             ModeShare {
                 amplitude,
                 deflection: moved / deflection.max(trace.resolution.deflection),
@@ -492,8 +490,25 @@ impl TrialRuns<'_> {
                 kept: true,
             }
         };
-        (0..self.body.n_modes()).map(share).collect()
+        (0..eigenvalues.len()).map(share).collect()
     }
+}
+
+/// Contribution of a mode to the motion of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeShare {
+    /// Largest |q|.
+    pub amplitude: f64,
+    /// Largest deflection of a watched point (or of any node if none is watched) by this mode alone, relative to the
+    /// largest of all modes together.
+    pub deflection: f64,
+    /// Root of its largest elastic energy, relative to the largest of all modes together.
+    pub stress: f64,
+    /// Largest contribution to a recovery over its limit, without the part that static columns hold; `None` if no
+    /// recovery has a limit.
+    pub recovery: Option<f64>,
+    /// True if the mode is kept.
+    pub kept: bool,
 }
 
 /// Returns the multiplications of an evaluation of the equations of `body` with `groups`.

@@ -149,7 +149,7 @@ impl<'v> VariedRuns<'v> {
         let mut weight: Vec<f64> = Vec::new();
         for &at in of {
             let runs = self.cases[at].runs();
-            let shares = runs.shares_of(choice.pool, measures[at].trace());
+            let shares = runs.shares(choice.pool, measures[at].trace());
             let own = weights(&shares, &runs.scene.requirements.tolerance);
             weight.resize(own.len(), 0.0);
             weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
