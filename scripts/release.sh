@@ -135,7 +135,7 @@ for model in connecting_rod bracket_hex20 frame_beams; do
     if cmp --silent "$work/$model.ordinary.flex.h5" "$work/$model.static.flex.h5"; then
         echo "   $model: the same bytes"
     else
-        # METIS takes rand() of the C library, and principal axes its hypot(): evidence/pages/promises.md.
+        # METIS takes rand() of the C library: evidence/pages/promises.md.
         echo "   $model: the same body, not to the last bit"
     fi
 done

@@ -10,6 +10,37 @@ const OPENINGS: [&str; 9] = ["What", "Whether", "How", "Where", "Those", "That",
 const PHRASES: [&str; 9] =
     ["in vain", " anew", "is told", "are told", "is said", "are said", "of ours", "nobody", "bug of ours"];
 
+/// Functions of the standard library and of `nalgebra` that the C library computes: `libm` and `flexbody_linalg::rotation` have the
+/// same last bits everywhere.
+const OF_THE_C_LIBRARY: [&str; 26] = [
+    "sin",
+    "cos",
+    "tan",
+    "sin_cos",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "exp2",
+    "exp_m1",
+    "ln",
+    "ln_1p",
+    "log",
+    "log2",
+    "log10",
+    "powf",
+    "cbrt",
+    "hypot",
+    "scaled_axis",
+    "angle",
+    "slerp",
+    "powc",
+];
+
 /// The sources of the workspace and of the Python package: Rust, without tests.
 fn sources() -> Vec<PathBuf> {
     let mut found = Vec::new();
@@ -76,6 +107,30 @@ fn phrases_that_readers_stumbled_over_stay_out() {
             let lower = line.to_lowercase();
             for phrase in PHRASES.iter().filter(|phrase| spoken && lower.contains(**phrase)) {
                 wrong.push(format!("{}:{}: `{}` in {}", path.display(), at + 1, phrase.trim(), line.trim()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} places:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// The exponential of a matrix takes no function of the C library.
+#[test]
+fn elementary_functions_have_one_source() {
+    let mut wrong = Vec::new();
+    for path in sources() {
+        let text = fs::read_to_string(&path).expect("a source");
+        if path.components().any(|part| part.as_os_str() == "oracle" || part.as_os_str() == "tests") {
+            continue;
+        }
+        let shipped = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for (at, line) in shipped.lines().enumerate() {
+            let is_method =
+                |name: &&&str| line.contains(&format!(".{name}(")) || line.contains(&format!("f64::{name}"));
+            let turns =
+                ["Rotation3::from_axis_angle", "Rotation3::new("].iter().find(|name| line.contains(**name));
+            let of_matrix = line.contains("* step).exp()");
+            if let Some(name) = OF_THE_C_LIBRARY.iter().find(is_method).or(turns).filter(|_| !of_matrix) {
+                wrong.push(format!("{}:{}: `{name}`", path.display(), at + 1));
             }
         }
     }

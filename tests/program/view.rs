@@ -207,9 +207,23 @@ pub fn browser() -> Option<PathBuf> {
         .find(|file| file.is_file())
 }
 
+/// Number of attempts to start a browser: on a machine that is busy with other work its processes may end each other.
+const ATTEMPTS: usize = 3;
+
 /// Returns the document and the messages of the browser for a page; with an option for a screenshot it writes
-/// that instead.
+/// that instead. A page always has a document: a browser that prints none has not come so far, and is started again.
 pub fn browse(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String, String) {
+    let (mut document, mut messages) = browse_once(browser, page, asked, options);
+    for _ in 1..ATTEMPTS {
+        if !document.is_empty() || !options.contains(&"--dump-dom") {
+            break;
+        }
+        (document, messages) = browse_once(browser, page, asked, options);
+    }
+    (document, messages)
+}
+
+fn browse_once(browser: &Path, page: &Path, asked: &str, options: &[&str]) -> (String, String) {
     let own = tempfile::tempdir().expect("a folder");
     let usual = "--headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic \
         --no-first-run --disable-background-networking --disable-component-update --disable-sync --enable-logging=stderr";

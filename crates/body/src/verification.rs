@@ -22,6 +22,7 @@ use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry, side_by_side};
 use flexbody_model::{CheckedModel, Damping, FeModel, GeometricStiffness, RawModel, UnitLoad};
+use libm::pow;
 use nalgebra::Vector3;
 use recoveries::{limit_of_responses, recovery_checks};
 
@@ -371,7 +372,7 @@ struct ModeErrors {
 fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, recomputed: &Invariants) -> f64 {
     let excess = |(name, difference): (String, f64)| {
         let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| **known == name);
-        let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
+        let scale = digits.map_or(1.0, |(_, digits)| pow(10.0, *digits));
         0.5 * difference * scale
     };
     largest(primary_differences(body.invariants(), recomputed).into_iter().map(excess))

@@ -8,6 +8,7 @@ use flexbody_linalg::{
     Solve, Tall, combine, combine_in_place, dense_cholesky, divide, full_qr, gram, solve_upper,
     subtract_combination, uniform, weighted_square,
 };
+use libm::{exp2, log2};
 
 /// Part of a vector's squared norm in the diagonal of M below which its squared M-norm counts as zero: such a vector
 /// lies in the null space of M, and its M-norm is the rounding of the product.
@@ -143,7 +144,7 @@ impl<'a> Krylov<'a> {
         // The columns are scaled to an M-norm of about one, by a power of two, so that the squares of the result are in
         // range in any units.
         let heaviest = self.mass_diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        let unit = (-0.5 * heaviest.log2()).round().exp2();
+        let unit = exp2((-0.5 * log2(heaviest)).round());
         let x = Mat::from_fn(n, width, |i, j| unit * uniform(seed, i as u64, j as u64));
         self.context.count(|work| work.mass_columns += width as u64);
         let mut y = self.problem.pencil.apply_mass(x.as_ref());

@@ -9,6 +9,7 @@ use super::shapes::NodalShapes;
 use flexbody_body::convert::ShapeColumn;
 use flexbody_linalg::ties::first_largest;
 use flexbody_model::{LoadKind, UnitLoad};
+use libm::log10;
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -72,7 +73,7 @@ impl StiffeningDecks<'_> {
     /// K, so that hardly a digit is lost by their difference. The deck is linear in the stress.
     fn amplification(&self, step: usize) -> f64 {
         let strain = self.shapes.strain(step, self.solids);
-        if strain > 0.0 { 10f64.powi(-strain.log10().round() as i32) } else { 1.0 }
+        if strain > 0.0 { 10f64.powi(-log10(strain).round() as i32) } else { 1.0 }
     }
 
     /// Writes the deck of a step.

@@ -8,6 +8,7 @@ use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::ties::{first_smallest, sort_ascending};
 use flexbody_model::{Accepted, Coupling, Damping, Description, GeometricStiffness, Reference};
+use libm::hypot;
 use nalgebra::Vector3;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -549,7 +550,7 @@ impl Region {
             Self::Box { min, max } => Vector3::from_fn(|k, _| beyond(x[k], min[k], max[k])).norm(),
             Self::Cylinder { from, to, radius } => {
                 let [along, away, length] = beside_axis(from, to, x);
-                beyond(along, 0.0, length).hypot(beyond(away, radius[0], radius[1]))
+                hypot(beyond(along, 0.0, length), beyond(away, radius[0], radius[1]))
             }
             Self::Plane { point, normal, within } => {
                 let (point, normal) = (Vector3::from(point), Vector3::from(normal));

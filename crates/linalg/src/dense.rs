@@ -13,6 +13,7 @@ use faer::linalg::evd::{
 use faer::linalg::householder;
 use faer::linalg::qr::no_pivoting::factor as qr;
 use faer::{Auto, Col, Conj, Mat, MatRef, Par};
+use libm::hypot;
 
 /// Largest backward error |A V - V L| / |A| (maximum norms) of an accepted decomposition.
 const MAX_BACKWARD_ERROR: f64 = 3e-14;
@@ -202,8 +203,8 @@ fn sweep(g: &mut Mat<f64>) -> bool {
             rotated = true;
             // Use the smaller of the two angles that make the columns orthogonal.
             let ratio = (b - a) / (2.0 * mixed);
-            let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
-            let cosine = 1.0 / tangent.hypot(1.0);
+            let tangent = ratio.signum() / (ratio.abs() + hypot(ratio, 1.0));
+            let cosine = 1.0 / hypot(tangent, 1.0);
             let sine = cosine * tangent;
             for i in 0..g.nrows() {
                 let (x, y) = (g[(i, p)], g[(i, q)]);

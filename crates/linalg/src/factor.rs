@@ -8,6 +8,7 @@ use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::{Pencil, SymmetricMatrix, parallel, substitution};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
+use libm::{exp2, log2};
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
 
@@ -106,7 +107,7 @@ impl Analysis {
         let diagonals = pencil.stiffness().diagonal().into_iter().zip(pencil.mass_diagonal());
         let scale = diagonals.map(|(k, m)| {
             let diagonal = k.abs() + (sigma * m).abs();
-            if diagonal > 0.0 && diagonal.is_finite() { (-0.5 * diagonal.log2()).round().exp2() } else { 1.0 }
+            if diagonal > 0.0 && diagonal.is_finite() { exp2((-0.5 * log2(diagonal)).round()) } else { 1.0 }
         });
         Scaled { analysis: self, pencil, sigma, scale: scale.collect() }
     }

@@ -23,6 +23,7 @@ mod ordering;
 pub mod parallel;
 mod pencil;
 mod product;
+mod rotation;
 mod sparse;
 mod substitution;
 mod tall;
@@ -46,6 +47,7 @@ pub use ordering::connected_components;
 pub use parallel::instruction_set;
 pub use pencil::{Dependents, Elimination, Pencil, ReducedPencil};
 pub use product::{multiply, multiply_vector, quadratic_form, sum_terms};
+pub use rotation::{rotation, rotation_by};
 pub use sparse::{ColumnBlock, CscMatrix, Stored, SymmetricMatrix, split_columns};
 pub use tall::{
     Tall, add_combination, column_norms, column_products, combine, combine_in_place, combine_into, copied,

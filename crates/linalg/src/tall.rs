@@ -7,6 +7,7 @@ use super::parallel;
 use faer::linalg::matmul::matmul;
 use faer::prelude::ReborrowMut;
 use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
+use libm::{cos, log};
 use rayon::prelude::*;
 use std::mem::MaybeUninit;
 use std::ops::Range;
@@ -358,7 +359,7 @@ pub(crate) fn normal(row: u64, column: u64) -> f64 {
     // In (0, 1], since zero has no logarithm.
     let radius = 0.5 * (1.0 - uniform(1, row, column));
     let angle = std::f64::consts::PI * uniform(2, row, column);
-    (-2.0 * radius.max(f64::MIN_POSITIVE).ln()).sqrt() * angle.cos()
+    (-2.0 * log(radius.max(f64::MIN_POSITIVE))).sqrt() * cos(angle)
 }
 
 #[cfg(test)]

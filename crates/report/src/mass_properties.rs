@@ -3,6 +3,7 @@
 use crate::notation::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, ReferenceConditions};
 use flexbody_body::invariants::Invariants;
+use libm::atan2;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Largest product of inertia, relative to sqrt(I_kk I_ll), that counts as rounding of a principal frame.
@@ -103,7 +104,7 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
 fn turned_degrees(axes: &Matrix3<f64>) -> f64 {
     let skew =
         Vector3::new(axes[(2, 1)] - axes[(1, 2)], axes[(0, 2)] - axes[(2, 0)], axes[(1, 0)] - axes[(0, 1)]);
-    skew.norm().atan2(axes.trace() - 1.0).to_degrees()
+    atan2(skew.norm(), axes.trace() - 1.0).to_degrees()
 }
 
 /// Returns the centre of mass c / m in the body frame. Unit: length.

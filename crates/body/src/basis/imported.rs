@@ -13,6 +13,7 @@ use flexbody_base::provenance::SourceFile;
 use flexbody_eigen::{Accuracy, EigenFailure, EigenSolution, Proof, Wanted, modes_of_span};
 use flexbody_linalg::{Analysis, CscMatrix, Indefinite, Pencil, SymmetricMatrix, column_products, gram};
 use flexbody_model::{FeModel, LostRow, RawModes, RawShapes};
+use libm::log10;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -480,7 +481,7 @@ impl StatedModes {
             if value == 0.0 {
                 0.0
             } else {
-                10f64.powi(value.abs().log10().floor() as i32 + 1 - i32::from(self.digits))
+                10f64.powi(log10(value.abs()).floor() as i32 + 1 - i32::from(self.digits))
             }
         };
         let column = shapes.col(mode);

@@ -15,6 +15,7 @@ use flexbody_eigen::{Accuracy, EigenSolution, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_linalg::gram;
 use flexbody_model::FeModel;
+use libm::acos;
 use std::collections::HashMap;
 
 /// Result of a fully lumped pipeline: the modes come from the lumped mass as well.
@@ -152,7 +153,7 @@ fn caution(
         })
     });
     let disjoint = (subspace_cosine < MIN_SUBSPACE_COSINE).then(|| {
-        let angle = subspace_cosine.clamp(0.0, 1.0).acos().to_degrees();
+        let angle = acos(subspace_cosine.clamp(0.0, 1.0)).to_degrees();
         format!("the subspaces differ by {angle:.0} degrees: other modes are among the lowest {count}")
     });
     let found: Vec<String> = cut.chain(disjoint).collect();

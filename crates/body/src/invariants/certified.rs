@@ -13,6 +13,7 @@ use flexbody_linalg::{
     CompensatedBlock, DoubleDouble, LANES, SymmetricMatrix, accumulate, accumulate_pair, gram_compensated,
     larger, multiply_compensated, parallel, sum_length, with_fma,
 };
+use libm::log10;
 use nalgebra::Matrix3;
 use std::ops::Range;
 
@@ -28,7 +29,7 @@ const ROUNDING_MARGIN: f64 = 1.0 + 1e-6;
 /// Returns the digits that a relative error leaves: -log10 of the error, between zero (also for NaN) and
 /// -log10(2^-53) = 15.95, the digits of a number that is stored as f64.
 pub fn digits_of_error(error: f64) -> f64 {
-    (-larger(error, UNIT_ROUNDOFF).log10()).max(0.0)
+    (-log10(larger(error, UNIT_ROUNDOFF))).max(0.0)
 }
 
 /// Invariants with guaranteed digits, by their names in the file.

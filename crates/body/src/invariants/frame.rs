@@ -9,6 +9,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, contiguous_mut, parallel};
+use libm::hypot;
 use nalgebra::{Matrix3, Vector3};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
@@ -364,8 +365,8 @@ fn jacobi(matrix: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
             }
             rotated = true;
             let theta = (a[(q, q)] - a[(p, p)]) / (2.0 * a[(p, q)]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
+            let t = theta.signum() / (theta.abs() + hypot(theta, 1.0));
+            let c = 1.0 / hypot(t, 1.0);
             let s = t * c;
             let mut rotation = Matrix3::identity();
             (rotation[(p, p)], rotation[(p, q)]) = (c, s);

@@ -6,6 +6,7 @@ use super::transform::{entries, spectral_norm, symmetric_eigenvalues};
 use super::{CauchySchwarz, Invariants};
 use faer::Mat;
 use flexbody_linalg::{dense_cholesky, larger};
+use libm::hypot;
 use nalgebra::Matrix3;
 
 /// Returns the largest f over a rectangle of indices, at least 0.
@@ -89,7 +90,7 @@ pub(super) fn ibar_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
         let size = |p| match body.0.general {
             // Ibar represents W1 and C2: the difference is C2 about the third axis.
             Some(_) if k != l => bound.c2(3 - k - l, p),
-            _ => bound.ibar(k, p).hypot(bound.ibar(l, p)),
+            _ => hypot(bound.ibar(k, p), bound.ibar(l, p)),
         };
         over(body.n_modes(), 1, |p, _| scaled(body.0.ibar[k][l][p] - body.0.ibar[l][k][p], size(p)))
     })

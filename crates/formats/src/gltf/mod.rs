@@ -18,6 +18,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
+use libm::sin;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
@@ -328,7 +329,7 @@ fn of_modes(binary: &mut Binary, names: &[String], node: usize) -> Vec<Value> {
     let input = binary.times(&times);
     let mut all = Vec::new();
     for (j, name) in names.iter().enumerate() {
-        let weight = |step: usize, k: usize| if k == j { (TAU * part(step)).sin() as f32 } else { 0.0 };
+        let weight = |step: usize, k: usize| if k == j { sin(TAU * part(step)) as f32 } else { 0.0 };
         let weights: Vec<[f32; 1]> =
             (0..=STEPS).flat_map(|step| (0..names.len()).map(move |k| [weight(step, k)])).collect();
         let output = binary.keys("SCALAR", &weights);

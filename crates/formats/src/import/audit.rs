@@ -10,6 +10,7 @@ use flexbody_base::numbers::significant;
 use flexbody_body::flex_body::rigid_motions;
 use flexbody_body::invariants::{IdentityCheck, Invariants, identities};
 use flexbody_linalg::{dense_cholesky, symmetric_eigen};
+use libm::log10;
 
 /// Range of the radius of gyration relative to the extent of the frames: a rod has 0.29, a ring 0.5. Values
 /// far outside indicate different units of length; the range is wide because frames may cover only a part of
@@ -261,7 +262,7 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
         code: Code::AuditUnits,
         meaning,
     };
-    let guess = |factor: f64| match factor.log10().round() {
+    let guess = |factor: f64| match log10(factor).round() {
         d if d.is_finite() && d != 0.0 => format!(", as if units of length differed by about 1e{d:+.0}"),
         _ => String::new(),
     };

@@ -7,6 +7,8 @@ use crate::sets::{Item, Members, NodeSets, SetIndex, SetInstance, SetScope, comp
 use flexbody_base::diagnostic::{Code, Diagnosed, Diagnostic};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::scanner::{self, BadLines, excerpt, integer};
+use flexbody_linalg::rotation;
+use libm::sincos;
 use nalgebra::{Rotation3, Unit, Vector3};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -134,7 +136,7 @@ impl Placement {
     pub(super) fn rotation(&self) -> Rotation3<f64> {
         self.turn.map_or(Rotation3::identity(), |[a, b, c, d, e, f, degrees]| {
             let axis = Vector3::new(d - a, e - b, f - c);
-            Rotation3::from_axis_angle(&Unit::new_normalize(axis), degrees.to_radians())
+            rotation(&Unit::new_normalize(axis), degrees.to_radians())
         })
     }
 }
@@ -586,11 +588,11 @@ fn real(field: &[u8]) -> Option<f64> {
 /// radius, longitude and latitude in degrees).
 fn in_cartesian(system: &str, x: [f64; 3]) -> [f64; 3] {
     let [r, theta, third] = x;
-    let (sin, cos) = theta.to_radians().sin_cos();
+    let (sin, cos) = sincos(theta.to_radians());
     match system {
         "C" => [r * cos, r * sin, third],
         "S" => {
-            let (up, out) = third.to_radians().sin_cos();
+            let (up, out) = sincos(third.to_radians());
             [r * cos * out, r * sin * out, r * up]
         }
         _ => x,

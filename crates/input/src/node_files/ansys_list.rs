@@ -6,8 +6,9 @@ use crate::node_file::NodeFile;
 use flexbody_base::diagnostic::Diagnosed;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::scanner::{Line, Lines, integer, real, words};
+use flexbody_linalg::rotation;
 use flexbody_model::NodeAxes;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
 /// Returns true when the text begins with a header with tabs and a column X, or with the listing of NLIST.
 pub(super) fn recognises(head: &str) -> bool {
@@ -67,7 +68,7 @@ pub(super) fn axes([xy, yz, zx]: [f64; 3]) -> Option<NodeAxes> {
     if [xy, yz, zx] == [0.0; 3] {
         return None;
     }
-    let about = |axis, degrees: f64| Rotation3::from_axis_angle(&axis, degrees.to_radians());
+    let about = |axis, degrees: f64| rotation(&axis, degrees.to_radians());
     let turn = about(Vector3::z_axis(), xy) * about(Vector3::x_axis(), yz) * about(Vector3::y_axis(), zx);
     Some([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (turn * axis).into()))
 }

@@ -8,6 +8,7 @@ use flexbody_base::text::input_file::InputFile;
 use flexbody_linalg::ties::first_smallest;
 use flexbody_linalg::{CscMatrix, parallel};
 use flexbody_model::{DofLabel, GivenRows, RawMatrix, UnitLoad};
+use libm::log10;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
@@ -153,7 +154,7 @@ fn difference(stressed: &RawMatrix, plain: &RawMatrix, load_size: f64) -> Result
         |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |most, value| most.max(value.abs()));
     let of_stiffness = largest(&mut plain.matrix.values().iter().copied());
     let of_stress = largest(&mut entries.iter().map(|entry| entry.2));
-    let left = f64::from(digits) + (of_stress / of_stiffness).log10();
+    let left = f64::from(digits) + log10(of_stress / of_stiffness);
     if left.is_nan() || left < MIN_DIGITS {
         let message = if of_stress > 0.0 {
             format!(

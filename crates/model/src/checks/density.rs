@@ -17,6 +17,7 @@ use crate::wording::name_some;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_linalg::{SymmetricMatrix, parallel};
+use libm::pow;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -193,7 +194,7 @@ fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64>
     let arms: Vec<Vector3<f64>> = corners.iter().map(|x| x - middle).collect();
     let covariance = arms.iter().map(|r| r * r.transpose()).sum::<Matrix3<f64>>() / count;
     let root = covariance.determinant().max(0.0).sqrt();
-    let ball = (covariance.trace() / 3.0).powf(1.5);
+    let ball = pow(covariance.trace() / 3.0, 1.5);
     if root <= ball * if linear && corners.len() == 4 { FLAT_TETRAHEDRON } else { FLAT_VOLUME } {
         return None;
     }

@@ -12,6 +12,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_linalg::ties::{first_largest, sort_descending};
 use flexbody_linalg::{Pencil, gram, parallel};
+use libm::log10;
 use std::ops::Range;
 
 /// Decimal digits of a value from which on its binary digits limit the accuracy.
@@ -79,7 +80,7 @@ fn rounding_error(value: f64, digits: u8) -> f64 {
     if digits >= BINARY_DIGITS || value == 0.0 {
         return binary;
     }
-    let last_digit = value.abs().log10().floor() as i32 + 1 - i32::from(digits);
+    let last_digit = log10(value.abs()).floor() as i32 + 1 - i32::from(digits);
     0.5 * 10f64.powi(last_digit) + binary
 }
 

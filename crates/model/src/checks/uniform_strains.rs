@@ -20,6 +20,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::numbers::significant;
 use flexbody_linalg::{combine, dense_cholesky, gram, solve_lower, solve_upper};
+use libm::{log10, pow};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use std::collections::HashMap;
 
@@ -119,7 +120,7 @@ fn in_digits(ratio: f64) -> String {
 /// Returns a ratio in one digit: `1e-6`, `0.004`, `300`.
 fn short(ratio: f64) -> String {
     if (1e-3..1e4).contains(&ratio) {
-        let digits = 10f64.powf(ratio.log10().floor());
+        let digits = pow(10.0, log10(ratio).floor());
         return format!("{}", (ratio / digits).round() * digits);
     }
     format!("{ratio:.0e}")

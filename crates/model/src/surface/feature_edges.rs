@@ -1,5 +1,6 @@
 //! Feature edges that show the form of a surface.
 
+use libm::cos;
 use nalgebra::Vector3;
 
 /// Angle between two surfaces, in degrees, above which there is an edge between them.
@@ -35,7 +36,7 @@ pub(crate) fn feature_edges(
             let turned = if one.step == other.step { -1.0 } else { 1.0 };
             let cosine = turned * normal(one).dot(&normal(other));
             // Triangles without area have no normal, and no feature edge.
-            cosine < FEATURE_ANGLE_DEGREES.to_radians().cos()
+            cosine < cos(FEATURE_ANGLE_DEGREES.to_radians())
                 && normal(one) != Vector3::zeros()
                 && normal(other) != Vector3::zeros()
         }

@@ -3,6 +3,7 @@
 
 use super::kernels::add_scaled;
 use super::{EquationsOfMotion, Evaluation};
+use libm::{atan2, sin, sincos};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Parameters theta (R of them) of the rotation A from body axes to world axes, with omega = G(theta)
@@ -99,7 +100,7 @@ impl From<EulerParameters> for RotationVector {
         let sign = if p0 < 0.0 { -1.0 } else { 1.0 };
         let e = Vector3::new(p1, p2, p3) * sign;
         let sin = e.norm();
-        let angle = 2.0 * sin.atan2(sign * p0);
+        let angle = 2.0 * atan2(sin, sign * p0);
         Self(if sin > 0.0 { e * (angle / sin) } else { e * 2.0 })
     }
 }
@@ -108,7 +109,7 @@ impl From<RotationVector> for EulerParameters {
     /// Returns (cos f/2, v/f sin f/2) with f = |v|.
     fn from(RotationVector(vector): RotationVector) -> Self {
         let angle = vector.norm();
-        let (sin, cos) = (0.5 * angle).sin_cos();
+        let (sin, cos) = sincos(0.5 * angle);
         let e = if angle > 0.0 { vector * (sin / angle) } else { Vector3::zeros() };
         Self([cos, e.x, e.y, e.z])
     }
@@ -174,10 +175,10 @@ impl RotationVector {
             let ((a, _), (b, b_slope), (c, c_slope)) = (series(1), series(2), series(3));
             return [a, b, c, b_slope, c_slope];
         }
-        let sin = f.sin();
+        let (whole, half) = (sin(f), sin(0.5 * f));
         // 1 - cos without cancellation.
-        let (b, c) = (2.0 * (0.5 * f).sin().powi(2) / square, (f - sin) / (square * f));
-        [sin / f, b, c, (sin / f - 2.0 * b) / square, (b - 3.0 * c) / square]
+        let (b, c) = (2.0 * half.powi(2) / square, (f - whole) / (square * f));
+        [whole / f, b, c, (whole / f - 2.0 * b) / square, (b - 3.0 * c) / square]
     }
 
     /// Returns d(G x)/dv for a constant x.
@@ -220,7 +221,7 @@ pub struct PlaneAngle(pub f64);
 
 impl Orientation<1> for PlaneAngle {
     fn axes(&self) -> Matrix3<f64> {
-        let (sin, cos) = self.0.sin_cos();
+        let (sin, cos) = sincos(self.0);
         Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)
     }
 

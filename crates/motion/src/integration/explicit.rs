@@ -1,6 +1,7 @@
 //! Explicit Runge-Kutta steps of order 8 with error control.
 
 use super::{Failure, System, Work};
+use libm::{exp2, log2, pow};
 
 /// Safety factor: the next step is chosen for an error of this part of the tolerance.
 const STEP_SAFETY_FACTOR: f64 = 0.9;
@@ -153,7 +154,7 @@ impl Explicit {
                 Err(Failure::Rates { .. }) => f64::INFINITY,
                 Err(failure) => return Err(failure),
             };
-            let factor = (STEP_SAFETY_FACTOR * error.powf(-1.0 / 8.0)).clamp(MIN_STEP_FACTOR, grow);
+            let factor = (STEP_SAFETY_FACTOR * pow(error, -1.0 / 8.0)).clamp(MIN_STEP_FACTOR, grow);
             if error <= 1.0 {
                 let next = self.on_grid(h * factor);
                 self.proposed = Some(if h < length { length.max(next) } else { next });
@@ -274,7 +275,7 @@ impl Explicit {
         self.scales = scales;
         let pace = speed.max(change.sqrt());
         Ok(match probed {
-            Ok(()) if pace > 0.0 && pace.is_finite() => (self.tolerance.powf(1.0 / 8.0) / pace).min(longest),
+            Ok(()) if pace > 0.0 && pace.is_finite() => (pow(self.tolerance, 1.0 / 8.0) / pace).min(longest),
             Ok(()) if pace == 0.0 => longest,
             _ => probe,
         })
@@ -284,8 +285,8 @@ impl Explicit {
 /// Returns the largest length unit 2^(k / per_octave) up to `length`. A length of the grid is itself, whatever its rounding.
 pub(super) fn on_grid(unit: f64, length: f64, per_octave: f64) -> f64 {
     const ROUNDING: f64 = 1e-9;
-    let octaves = (length / unit).log2();
-    unit * ((per_octave * octaves + ROUNDING).floor() / per_octave).exp2()
+    let octaves = log2(length / unit);
+    unit * exp2((per_octave * octaves + ROUNDING).floor() / per_octave)
 }
 
 /// Returns length and end of a step of `length` from `time`, at most to `end`: a remainder too short for a step of its own is

@@ -2,6 +2,7 @@
 
 use super::explicit::{on_grid, within};
 use super::{Failure, Oscillator, System, Work, free_oscillation};
+use libm::{cos, hypot, pow};
 use nalgebra::{Matrix2, Vector2};
 
 /// Number of nodes of a step: Lobatto points, with both ends.
@@ -194,7 +195,7 @@ impl Exponential {
         }
         let error = self.error(h);
         let factor =
-            (STEP_SAFETY_FACTOR * error.max(LEAST_SEEN).powf(-1.0 / NODES as f64)).max(MIN_STEP_FACTOR);
+            (STEP_SAFETY_FACTOR * pow(error.max(LEAST_SEEN), -1.0 / NODES as f64)).max(MIN_STEP_FACTOR);
         if error.is_nan() || error > 1.0 {
             return Ok(self.refuse(h, if factor < 1.0 { factor } else { MIN_STEP_FACTOR }));
         }
@@ -474,8 +475,8 @@ impl Exponential {
                     std::array::from_fn(|n| Vector2::new(self.powers[n][x], self.powers[n][p]));
                 z -= value(&particular(oscillator, h, &powers), -1.0);
             }
-            let amplitude = z[1].hypot(rate * z[0]) / self.scales[p] * (rate / slowest);
-            h * rate * (amplitude / (128.0 * SEEN)).powf(0.25)
+            let amplitude = hypot(z[1], rate * z[0]) / self.scales[p] * (rate / slowest);
+            h * rate * pow(amplitude / (128.0 * SEEN), 0.25)
         };
         self.oscillators.iter().map(points).fold(0.0, f64::max)
     }
@@ -596,7 +597,7 @@ impl Tableau {
         let degree = NODES - 1;
         // Ends, and the roots of P', by Newton's method with (1 - t^2) P'' = 2 t P' - n (n + 1) P.
         let node = |i: usize| {
-            let mut t = -(std::f64::consts::PI * i as f64 / degree as f64).cos();
+            let mut t = -cos(std::f64::consts::PI * i as f64 / degree as f64);
             if i == 0 || i == degree {
                 return t.signum();
             }
@@ -668,7 +669,7 @@ fn legendre(degree: usize, t: f64) -> (f64, f64) {
 /// Returns points and weights of Gauss-Legendre quadrature.
 fn gauss_points() -> [(f64, f64); POINTS] {
     std::array::from_fn(|i| {
-        let mut t = -(std::f64::consts::PI * (i as f64 + 0.75) / (POINTS as f64 + 0.5)).cos();
+        let mut t = -cos(std::f64::consts::PI * (i as f64 + 0.75) / (POINTS as f64 + 0.5));
         for _ in 0..20 {
             let (p, slope) = legendre(POINTS, t);
             t -= p / slope;

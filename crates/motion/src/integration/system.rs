@@ -2,6 +2,7 @@
 
 use super::stages::StageMode;
 use flexbody_base::numbers::significant;
+use libm::{exp, expm1, sincos};
 
 /// System of ordinary differential equations y' = f(t, y).
 pub trait System {
@@ -158,14 +159,14 @@ pub fn free_oscillation(square: f64, decay: f64, step: f64) -> [f64; 2] {
     let difference = square - decay * decay;
     let root = difference.abs().sqrt();
     if difference > 0.0 {
-        let (sin, cos) = (root * step).sin_cos();
-        let fades = (-decay * step).exp();
+        let (sin, cos) = sincos(root * step);
+        let fades = exp(-decay * step);
         return [fades * cos, fades * sin / root];
     }
     // Slower decay rate, computed without the cancellation of d - root.
     let slow = square / (decay + root).max(f64::MIN_POSITIVE);
-    let fades = (-slow * step).exp();
-    let faster = -(-2.0 * root * step).exp_m1();
+    let fades = exp(-slow * step);
+    let faster = -expm1(-2.0 * root * step);
     [fades * (1.0 - 0.5 * faster), fades * if root > 0.0 { faster / (2.0 * root) } else { step }]
 }
 

@@ -3,7 +3,8 @@
 use super::{Driving, Scene};
 use crate::dynamics::{AlongFrame, Orientation, RotationVector};
 use flexbody_body::flex_body::{Frame, RigidAccelerations};
-use nalgebra::{Rotation3, Vector3};
+use flexbody_linalg::rotation_by;
+use nalgebra::Vector3;
 
 /// Number of intervals at whose ends the motion is computed.
 const INTERVALS: usize = 200;
@@ -26,7 +27,7 @@ pub fn carrier_accelerations(frame: &Frame, scene: &Scene) -> Vec<RigidAccelerat
         let (rate, alpha) = (vector(rates.linear), vector(rates.angular));
         let origin = rate + omega.cross(&velocity) - axes.tr_mul(&gravity);
         all.push(RigidAccelerations::new(origin, &omega, &alpha));
-        axes *= Rotation3::new(omega * step).matrix();
+        axes *= rotation_by(&(omega * step)).matrix();
     }
     all
 }

@@ -3,8 +3,9 @@
 use super::{Axes, History, Requirements, VectorHistory};
 use crate::dynamics::{RotationVector, Terms};
 use flexbody_base::provenance::SourceFile;
+use flexbody_linalg::rotation;
 use flexbody_linalg::ties::first_largest;
-use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Unit, Vector3};
 use std::path::PathBuf;
 
 /// A scene: initial state, loads and prescribed motion of a body, and settings of its simulation.
@@ -472,8 +473,8 @@ impl Scene {
     pub fn changed(&self, change: &Change) -> Self {
         match change {
             Change::Turn { axis, angle, load } => {
-                let rotation = Rotation3::from_axis_angle(axis, *angle);
-                self.with_directed_loads(*load, |history| history.turned(rotation.matrix()))
+                let turn = rotation(axis, *angle);
+                self.with_directed_loads(*load, |history| history.turned(turn.matrix()))
             }
             Change::Scale { factor, load } => self.with_loads(*load, |history| history.scaled(*factor)),
             Change::Move { load, to } => {
@@ -530,11 +531,11 @@ impl Scene {
         let percent = (100.0 * (STANDARD_FACTOR - 1.0)).round();
         for axis in self.axes_across(dimension) {
             let normal = Unit::new_unchecked(Vector3::ith(axis, 1.0));
-            let rotation = Rotation3::from_axis_angle(&normal, STANDARD_TURN.to_radians());
+            let turn = rotation(&normal, STANDARD_TURN.to_radians());
             let about =
                 if dimension == 2 { String::new() } else { format!(" about {}", ["x", "y", "z"][axis]) };
             all.extend(
-                self.varied_excitation(|history| history.turned(rotation.matrix()))
+                self.varied_excitation(|history| history.turned(turn.matrix()))
                     .map(|(what, scene)| (format!("{what} turned by {STANDARD_TURN} degrees{about}"), scene)),
             );
         }

@@ -8,6 +8,7 @@ use faer::MatRef;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::ties::first_largest;
 use flexbody_linalg::{larger, not_negative};
+use libm::atan2;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not compared.
@@ -205,7 +206,7 @@ fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
     let (a, b) = (Vector3::new(a1, a2, a3), Vector3::new(b1, b2, b3));
     let scalar = a0 * b0 + a.dot(&b);
     let vector = b * a0 - a * b0 - a.cross(&b);
-    2.0 * vector.norm().atan2(scalar.abs())
+    2.0 * atan2(vector.norm(), scalar.abs())
 }
 
 /// Reference motion of a body, against which other motions are measured.

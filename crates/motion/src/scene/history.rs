@@ -1,6 +1,7 @@
 //! Scalar and vector functions of time, and the axes of vectors.
 
 use super::samples::{Samples, Sizes};
+use libm::{cos, sin, sincos};
 use nalgebra::{Matrix3, Vector1, Vector3};
 use std::f64::consts::TAU;
 
@@ -59,12 +60,12 @@ impl History {
                 }
             }
             Self::Sine { amplitude, frequency, phase } => {
-                let (sin, cos) = (TAU * frequency * time + phase).sin_cos();
+                let (sin, cos) = sincos(TAU * frequency * time + phase);
                 (amplitude * sin, amplitude * TAU * frequency * cos)
             }
             Self::Ramp { from, to, start, duration } => {
                 let x = ((time - start) / duration).clamp(0.0, 1.0);
-                let (sin, cos) = (TAU * x).sin_cos();
+                let (sin, cos) = sincos(TAU * x);
                 (from + (to - from) * (x - sin / TAU), (to - from) * (1.0 - cos) / duration)
             }
             Self::Samples(samples) => {
@@ -91,13 +92,13 @@ impl History {
             Self::Sine { amplitude, frequency, phase } => {
                 let half = 0.5 * TAU * frequency * time;
                 // cos(phase) - cos(2 half + phase), without cancellation.
-                amplitude / (TAU * frequency) * 2.0 * (half + phase).sin() * half.sin()
+                amplitude / (TAU * frequency) * 2.0 * sin(half + phase) * sin(half)
             }
             Self::Ramp { from, to, start, duration } => {
                 let risen = |time: f64| {
                     let x = ((time - start) / duration).clamp(0.0, 1.0);
                     let after = (time - start - duration).max(0.0);
-                    duration * (0.5 * x * x + ((TAU * x).cos() - 1.0) / (TAU * TAU)) + after
+                    duration * (0.5 * x * x + (cos(TAU * x) - 1.0) / (TAU * TAU)) + after
                 };
                 from * time + (to - from) * (risen(time) - risen(0.0))
             }
@@ -112,7 +113,7 @@ impl History {
             Self::Sine { frequency, .. } => -(TAU * frequency).powi(2) * self.at(time).0,
             Self::Ramp { from, to, start, duration } => {
                 let x = ((time - start) / duration).clamp(0.0, 1.0);
-                (to - from) * TAU * (TAU * x).sin() / (duration * duration)
+                (to - from) * TAU * sin(TAU * x) / (duration * duration)
             }
             Self::Samples(samples) => samples.at(time).second[0],
         }

@@ -4,6 +4,7 @@ use super::prepared::{Prepared, STABLE, fastest_history};
 use super::{Scene, Scheme};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
+use libm::{log10, pow};
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
@@ -110,7 +111,7 @@ fn step_of_motion(scene: &Scene, duration: f64) -> f64 {
     let frequency = fastest_history(scene, duration).max(rate / TAU);
     let spacing = scene.acting().chain(scene.driving()).filter_map(|history| history.spacing());
     let step = spacing.fold((piece / STEPS_PER_PIECE).min(1.0 / (STEPS_PER_MOTION * frequency)), f64::min);
-    let digit = 10f64.powf(step.log10().floor());
+    let digit = pow(10.0, log10(step).floor());
     // The decimal text gives the nearest number without the error of the power.
     format!("{:.0e}", (step / digit * (1.0 + 1e-9)).floor() * digit).parse().unwrap_or(step)
 }

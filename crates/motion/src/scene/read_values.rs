@@ -12,6 +12,7 @@ use crate::dynamics::{EulerParameters, Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::series::closer_than_rounding;
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, real};
+use libm::acos;
 use nalgebra::{Vector3, Vector4};
 use std::ops::Range;
 use toml::de::DeValue;
@@ -350,7 +351,7 @@ impl Attitudes {
                 if before.dot(&unit) < 0.0 {
                     unit = -unit;
                 }
-                let angle = 2.0 * before.dot(&unit).min(1.0).acos();
+                let angle = 2.0 * acos(before.dot(&unit).min(1.0));
                 if angle > LARGEST_TURN {
                     let message = format!(
                         "the attitude turns by {:.0} degrees from the row before",

@@ -8,6 +8,7 @@ use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{CauchySchwarz, Invariants};
 use flexbody_linalg::ties::sort_descending;
+use libm::pow;
 
 /// Largest number of modes in a map.
 const MODES: usize = 40;
@@ -28,7 +29,7 @@ pub(super) fn heat_maps<'a>(body: &FlexBody) -> Vec<Block<'a>> {
     let modes: Vec<usize> = (0..all.min(MODES)).collect();
     let some =
         if all > MODES { format!(" The first {MODES} of {all} modes are shown.") } else { String::new() };
-    let factor = significant(10f64.powf(f64::from(DECADES) / STEPS as f64), 2);
+    let factor = significant(pow(10.0, f64::from(DECADES) / STEPS as f64), 2);
     let reading = format!(
         "Each cell is the size of an entry relative to the largest that it could have, on a logarithmic scale: the strongest colour stands for 1, and each of the {STEPS} steps down for a factor of {factor}. Empty cells are smaller than 1e-{DECADES}. Pointing at a cell shows its value.{some}"
     );

@@ -1,6 +1,7 @@
 //! Axes of charts: range of values, scale and tick marks.
 
 use crate::notation::numbers::significant;
+use libm::{log10, pow};
 
 /// Approximate number of intervals between the ticks of a linear axis; the step is rounded to 1, 2 or 5 times
 /// a power of ten.
@@ -25,7 +26,7 @@ impl Scale {
     fn of(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
-            Self::Logarithmic => value.log10(),
+            Self::Logarithmic => log10(value),
         }
     }
 }
@@ -82,7 +83,7 @@ impl Axis {
     /// Returns the logarithmic axis over whole decades around all positive `values`, limited to the `most`
     /// highest decades; `None` without a positive value.
     pub(crate) fn decades(label: &str, values: impl Iterator<Item = f64>, most: f64) -> Option<Self> {
-        let positive = values.filter(|value| *value > 0.0 && value.is_finite()).map(f64::log10);
+        let positive = values.filter(|value| *value > 0.0 && value.is_finite()).map(log10);
         let (low, high) = positive.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), power| {
             (low.min(power.floor()), high.max(power.ceil()))
         });
@@ -136,7 +137,7 @@ impl Axis {
 
 /// Returns the smallest of 1, 2 and 5 times a power of ten that is not below `step`.
 fn round_step(step: f64) -> f64 {
-    let power = 10f64.powf(step.log10().floor());
+    let power = pow(10.0, log10(step).floor());
     let round = [1.0, 2.0, 5.0, 10.0].into_iter().find(|factor| factor * power >= step * (1.0 - 1e-12));
     round.unwrap_or(10.0) * power
 }

@@ -4,6 +4,7 @@ use super::axis::Axis;
 use super::svg::{At, label};
 use crate::notation::markup::Plain;
 use crate::notation::numbers::significant;
+use libm::log10;
 use maud::{Markup, Render, html};
 
 /// Number of decades of the scale below 1, and number of colour steps.
@@ -32,7 +33,7 @@ pub(crate) fn step(value: f64) -> Option<usize> {
     if value.is_nan() || value > 1.0 {
         return Some(last);
     }
-    let steps = (value.log10() / f64::from(DECADES) + 1.0) * STEPS as f64;
+    let steps = (log10(value) / f64::from(DECADES) + 1.0) * STEPS as f64;
     (steps >= 0.0).then(|| (steps as usize).min(last))
 }
 

@@ -7,6 +7,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::numbers::runs;
 use flexbody_body::flex_body::FlexBody;
+use libm::log;
 use std::ops::Range;
 
 /// Paired modes of two bodies (indices from 0, ascending, the same number for both).
@@ -87,7 +88,7 @@ fn partners(fewer: &[f64], more: &[f64], by_shape: &[Option<usize>]) -> Vec<usiz
 /// ascending choice with the smallest sum of |ln(lambda_i / lambda_j)|, found by dynamic programming.
 fn nearest(fewer: &[f64], more: &[f64]) -> Vec<usize> {
     let (n, m) = (fewer.len(), more.len());
-    let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs();
+    let distance = |i: usize, j: usize| log(fewer[i] / more[j]).abs();
     // sums[i][j] is the smallest sum of the first i eigenvalues with partners among the first j.
     let mut sums = vec![vec![f64::INFINITY; m + 1]; n + 1];
     sums[0].fill(0.0);

@@ -11,6 +11,7 @@ use faer::{Mat, MatRef};
 use flexbody_body::flex_body::{FlexBody, GeometricStiffness, Interface, InternalRows, LoadKind, UnitLoad};
 use flexbody_body::invariants::InertiaStiffness;
 use flexbody_linalg::{gram, larger, largest_entry};
+use libm::pow;
 use nalgebra::Vector3;
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -251,7 +252,7 @@ impl BodyComparison {
 
     /// Compares D_pq / (2 sqrt(omega_p omega_q)); the diagonal holds the damping ratios.
     fn damping(&mut self, pair: &Pair<'_>, matrices: &Matrices<'_>, tolerance: f64) {
-        let root: Vec<f64> = pair.a.modes().eigenvalue.iter().map(|lambda| lambda.powf(0.25)).collect();
+        let root: Vec<f64> = pair.a.modes().eigenvalue.iter().map(|lambda| pow(*lambda, 0.25)).collect();
         let ratios =
             |d: &Mat<f64>| Mat::from_fn(d.nrows(), d.ncols(), |p, q| d[(p, q)] / (2.0 * root[p] * root[q]));
         let (a, b) = (ratios(&pair.a.damping()), ratios(&pair.b.damping()));

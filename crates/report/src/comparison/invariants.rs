@@ -11,6 +11,7 @@ use crate::mass_properties::gyration_radius;
 use faer::Mat;
 use flexbody_body::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use flexbody_linalg::larger;
+use libm::hypot;
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -90,7 +91,7 @@ impl BodyComparison {
         let exact = a.invariants();
         let bound = CauchySchwarz::of(exact);
         let size = |g: &Range<usize>| g.clone().map(|p| bound.mode(p).powi(2)).sum::<f64>().sqrt();
-        let norm = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |sum, v| sum.hypot(v));
+        let norm = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, hypot);
         let (mut c1, mut ibar, mut s) = (0.0, 0.0, 0.0);
         for g in groups {
             for k in 0..3 {

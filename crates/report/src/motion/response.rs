@@ -14,6 +14,7 @@ use flexbody_linalg::ties::descending;
 use flexbody_study::response::{
     At, Complex, Direction, Effectivity, Function, Output, Pair, Response, ResponseSettings, Spacing,
 };
+use libm::{atan2, hypot};
 use serde::Serialize;
 
 /// Number of plots per pair of places: the functions with the largest accelerances. More plots make the page
@@ -161,7 +162,7 @@ impl PairFacts {
     /// Returns the functions with the largest accelerances w^2 |H|, in their original order.
     fn strongest(&self, hertz: &[f64]) -> Vec<&FunctionFacts> {
         let peak = |function: &FunctionFacts| {
-            let accelerances = function.reduced.iter().zip(hertz).map(|(z, f)| f * f * z[0].hypot(z[1]));
+            let accelerances = function.reduced.iter().zip(hertz).map(|(z, f)| f * f * hypot(z[0], z[1]));
             accelerances.filter(|a| a.is_finite()).fold(0.0, f64::max)
         };
         let peaks: Vec<f64> = self.functions.iter().map(peak).collect();
@@ -416,12 +417,12 @@ fn decades(unit: &str, series: &[Series]) -> Axis {
 }
 
 fn amplitude(function: &FunctionFacts, hertz: &[f64], unit: &str) -> Panel {
-    let series = curves(function, hertz, Mark::Line, |z| z[0].hypot(z[1]));
+    let series = curves(function, hertz, Mark::Line, |z| hypot(z[0], z[1]));
     Panel { caption: "amplitude".to_owned(), y: decades(unit, &series), height: 170.0, series }
 }
 
 fn phase(function: &FunctionFacts, hertz: &[f64]) -> Panel {
-    let series = curves(function, hertz, Mark::Angle, |z| z[1].atan2(z[0]).to_degrees());
+    let series = curves(function, hertz, Mark::Angle, |z| atan2(z[1], z[0]).to_degrees());
     Panel { caption: "phase".to_owned(), y: Axis::degrees(), height: 80.0, series }
 }
 

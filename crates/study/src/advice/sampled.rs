@@ -11,6 +11,7 @@ use flexbody_motion::scene::{
     Axes, FramedScene, History, Initial, Measure, ModeStart, OutputErrors, PerQuantity, Requirements, Run,
     Scene, Scheme, Spin, Tolerance, Trace, VectorHistory, ends_a_run,
 };
+use libm::sincos;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -242,7 +243,7 @@ fn axes(dimension: usize) -> Vec<Vector3<f64>> {
     let golden = PI * (3.0 - 5f64.sqrt());
     let spiral = (0..spread).map(|at| {
         let height = 1.0 - (2.0 * at as f64 + 1.0) / spread as f64;
-        let (sin, cos) = (golden * at as f64).sin_cos();
+        let (sin, cos) = sincos(golden * at as f64);
         let radius = (1.0 - height * height).sqrt();
         Vector3::new(radius * cos, radius * sin, height)
     });

@@ -5,6 +5,7 @@ use super::principal::{principal, principal_directions};
 use faer::Mat;
 use flexbody_linalg::gram;
 use flexbody_linalg::ties::sort_descending;
+use libm::{sin, sincos};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::TAU;
@@ -256,7 +257,7 @@ fn around(level: &[f64], line: usize) -> f64 {
 fn transform(grid: &Grid, amplitudes: &Mat<f64>, rate: f64, settled: bool) -> Mat<f64> {
     let mut parts = Mat::<f64>::zeros(amplitudes.nrows(), 2);
     let mut add = |row: usize, increment: f64, time: f64| {
-        let (sin, cos) = (rate * time).sin_cos();
+        let (sin, cos) = sincos(rate * time);
         parts[(row, 0)] += increment * cos;
         parts[(row, 1)] -= increment * sin;
     };
@@ -268,7 +269,7 @@ fn transform(grid: &Grid, amplitudes: &Mat<f64>, rate: f64, settled: bool) -> Ma
             let increment = amplitudes[(row, i)] - amplitudes[(row, i - 1)];
             // A straight line over many periods has nothing of this frequency; intervals of a third of a period follow it.
             let half = 0.5 * rate * (grid.times[i] - grid.times[i - 1]);
-            let of_line = if half > 1.0 { half.sin() / half } else { 1.0 };
+            let of_line = if half > 1.0 { sin(half) / half } else { 1.0 };
             add(row, increment * of_line, 0.5 * (grid.times[i] + grid.times[i - 1]));
         }
     }

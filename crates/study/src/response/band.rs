@@ -1,5 +1,7 @@
 //! Frequencies at which a response is evaluated.
 
+use libm::pow;
+
 /// Smallest ratio of the ends of a band whose frequencies are spaced by equal ratios.
 const MIN_LOGARITHMIC_RATIO: f64 = 20.0;
 
@@ -96,7 +98,7 @@ impl Band {
             match self.spacing() {
                 _ if i == steps => self.high,
                 Spacing::Linear => self.low + (self.high - self.low) * part,
-                Spacing::Logarithmic => self.low * (self.high / self.low).powf(part),
+                Spacing::Logarithmic => self.low * pow(self.high / self.low, part),
             }
         })
     }

@@ -7,6 +7,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::series::{ColumnKey, has_column, read_series};
 use flexbody_linalg::symmetric_eigen;
+use libm::{log, pow};
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -124,7 +125,7 @@ impl SpectralDensities {
         let density = |i: usize| {
             let (a, b) = (self.own[at - 1][i], self.own[at][i]);
             if a > 0.0 && b > 0.0 && low > 0.0 {
-                a * (b / a).powf((hertz / low).ln() / (high / low).ln())
+                a * pow(b / a, log(hertz / low) / log(high / low))
             } else {
                 a + (b - a) * part
             }

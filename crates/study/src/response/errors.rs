@@ -1,5 +1,6 @@
 //! Relative difference of two transfer functions between two places.
 
+use libm::log10;
 use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
@@ -64,7 +65,7 @@ impl PairErrors {
         let estimated: Vec<f64> = compared.iter().map(|at| relative(at.reduced, at.enriched)).collect();
         let decibels = compared.iter().filter_map(|at| {
             let ratio = norm(at.reduced) / norm(at.full?);
-            Some(At { hertz: at.hertz, value: 20.0 * ratio.log10() })
+            Some(At { hertz: at.hertz, value: 20.0 * log10(ratio) })
         });
         // The measured error takes precedence over the estimate.
         let both: Vec<At> = (0..compared.len())

@@ -14,6 +14,7 @@
 use super::norms::Norms;
 use flexbody_body::flex_body::TermGroups;
 use flexbody_motion::scene::{History, Sizes, VectorHistory};
+use libm::exp;
 use std::f64::consts::TAU;
 
 /// Modal load: a direction times a function of time.
@@ -143,7 +144,7 @@ impl Operator {
         }
         let growth = coupling / (margin.sqrt() * norms.first) + rotation.largest * softening / margin;
         let turned = driven.turned.force;
-        let growth = (rotation.variation * growth + product(turned, rotation.duration) / margin.sqrt()).exp();
+        let growth = exp(rotation.variation * growth + product(turned, rotation.duration) / margin.sqrt());
         let (first, settled) = (norms.first, driven.settled);
         Some(Self { margin, growth, softening, coupling, first, turned, rotation: *rotation, settled })
     }

@@ -7,6 +7,7 @@ use crate::import::AuditCheck;
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 use flexbody_linalg::ties::first_largest;
+use libm::pow;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 
@@ -330,7 +331,7 @@ fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
         let (mantissa, exponent) = pair[0].split_once(['e', 'E', 'd', 'D']).unwrap_or((pair[0], "0"));
         let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len()) as f64;
         let exponent: f64 = exponent.parse().unwrap_or(0.0);
-        Some((value, 0.5 * 10f64.powf(exponent - decimals), radians))
+        Some((value, 0.5 * pow(10.0, exponent - decimals), radians))
     })
 }
 

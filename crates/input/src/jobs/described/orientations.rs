@@ -5,7 +5,8 @@ use super::super::deck_mesh::Placement;
 use flexbody_base::diagnostic::{Code, Diagnosed};
 use flexbody_base::text::scanner::{excerpt, real};
 use flexbody_elements::Axes;
-use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use flexbody_linalg::rotation;
+use nalgebra::{Matrix3, Unit, Vector3};
 
 /// Returns the axes of a card in an instance at `moved`, or the reason in words why they are not described.
 ///
@@ -60,7 +61,7 @@ pub(super) fn orientation(deck: &Deck, card: &Card, moved: &Placement) -> Diagno
     let axes = rectangular(a - origin, b - origin).ok_or_else(|| no_axes(deck, card))?;
     let axes = turn.map_or(axes, |(axis, angle)| {
         let about = Unit::new_normalize(axes.column(axis).into_owned());
-        Rotation3::from_axis_angle(&about, angle) * axes
+        rotation(&about, angle) * axes
     });
     Ok(Ok(Axes::Fixed(moved.rotation() * axes)))
 }

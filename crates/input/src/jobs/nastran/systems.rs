@@ -2,6 +2,7 @@
 //! of coordinates and row axes.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
+use libm::{hypot, sincos};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -230,7 +231,7 @@ impl System {
     fn axes_at(&self, x: [f64; 3]) -> [[f64; 3]; 3] {
         let from = minus(x, self.origin);
         let [u, v, w] = self.axes.map(|axis| dot(axis, from));
-        let radius = u.hypot(v);
+        let radius = hypot(u, v);
         if self.kind == SystemKind::Rectangular || radius <= ON_THE_AXIS * length(from) {
             return self.axes;
         }
@@ -239,7 +240,7 @@ impl System {
         let mix = |a: f64, b: f64, c: f64| [0, 1, 2].map(|k| a * e[k] + b * f[k] + c * z[k]);
         match self.kind {
             SystemKind::Spherical => {
-                let whole = radius.hypot(w);
+                let whole = hypot(radius, w);
                 let (down, up) = (radius / whole, w / whole);
                 [mix(down * cos, down * sin, up), mix(up * cos, up * sin, -down), mix(-sin, cos, 0.0)]
             }
@@ -255,7 +256,7 @@ fn sin_cos(degrees: f64) -> (f64, f64) {
         90.0 => (1.0, 0.0),
         180.0 => (0.0, -1.0),
         270.0 => (-1.0, 0.0),
-        turn => turn.to_radians().sin_cos(),
+        turn => sincos(turn.to_radians()),
     }
 }
 
@@ -268,7 +269,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn length(a: [f64; 3]) -> f64 {
-    a[0].hypot(a[1]).hypot(a[2])
+    hypot(hypot(a[0], a[1]), a[2])
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

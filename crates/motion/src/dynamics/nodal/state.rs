@@ -8,6 +8,7 @@ use super::{NodalError, NodalEvaluation};
 use crate::dynamics::{Configuration, EulerParameters, Orientation};
 use faer::{Mat, MatRef};
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::rotation_by;
 use flexbody_linalg::{combine, gram, quadratic_form};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -289,7 +290,7 @@ impl NodalEquations<'_> {
                 break;
             }
             shift += turn * by;
-            turn *= Rotation3::new(about);
+            turn *= rotation_by(&about);
         }
         if left.is_nan() || left > RIGID_MOTION_TOLERANCE {
             return Err(NodalError::ConditionsViolated { part: left });
